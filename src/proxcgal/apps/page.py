@@ -1,0 +1,216 @@
+"""The HTML of a report: no network, no other file; all text escaped."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterator, Sequence
+from html import escape
+from importlib import resources
+from pathlib import Path
+
+from proxcgal.apps.stored import About, Numbers, Run
+from proxcgal.study.analysis import SELF_LIMIT_M, shown
+
+MAX_BYTES = 10_000_000  # of the whole page
+_SPARE_BYTES = 400_000  # kept for text
+PICTURES = (
+    (
+        "distance.png",
+        "Least distance between arm and obstacle, activation of the avoidance, and the link that "
+        "its control point lies on, over time. Solid: seen, as the controller computes it from the "
+        "filtered cloud. Dashed: true, exact meshes against the exact scene, known to the "
+        "simulator only. Dotted: the two thresholds between which the activation rises.",
+    ),
+    (
+        "pairs.png",
+        "The two controllers' closest pairs on the same posture. Left: any point of the arm's "
+        "surface may be the control point. Right: only the sensors' mounting points. Blue: the "
+        "obstacle. Red: the pair.",
+    ),
+    (
+        "motion.gif",
+        "The arm backing away. Points: the filtered cloud. Arrow: the closest pair.",
+    ),
+)
+PAPER = {
+    "front_plane": "[WA] Fig. 7: WB keeps a greater distance than SM, its control point is on the "
+    "flange; up to 100 mm more over all experiments",
+    "side_plane": "[WA] Fig. 8: a similar result; up to 100 mm more over all experiments",
+}
+NAMES = {
+    "wb": "wb, whole body",
+    "sm": "sm, sensor points",
+    "wb_known": "wb_known, whole body, scene known",
+}
+
+
+def page(runs: Sequence[Run], about: About) -> str:
+    """The page of these runs: valid HTML, everything inside.
+
+    Args:
+        runs: scenario by scenario.
+        about: how the whole was made, as `origin` has it.
+    """
+    return "\n".join(_parts(runs, about)) + "\n"
+
+
+def _parts(runs: Sequence[Run], about: About) -> Iterator[str]:
+    title = "Whole-arm avoidance: " + ", ".join(run.summary.scenario for run in runs)
+    css = resources.files("proxcgal.apps").joinpath("report.css").read_text()
+    yield "<!DOCTYPE html>"
+    yield '<html lang="en"><head><meta charset="utf-8">'
+    yield '<meta name="viewport" content="width=device-width, initial-scale=1">'
+    yield f"<title>{escape(title)}</title><style>{css}</style></head><body>"
+    yield f"<h1>{escape(title)}</h1>"
+    yield from _introduction(runs)
+    yield from _table(runs)
+    yield from _verdict(runs)
+    budget = MAX_BYTES - _SPARE_BYTES
+    for run in runs:
+        yield f"<h2>{escape(run.summary.scenario)}</h2>"
+        if run.about.description:
+            yield f"<p>{escape(run.about.description)}.</p>"
+        for name, caption in PICTURES:
+            part, used = _picture(run.folder / name, caption, budget)
+            budget -= used
+            yield part
+        yield from _trials(run)
+        yield from _recordings(run)
+    yield from _origin(about)
+    for run in runs:
+        if run.settings:
+            yield f"<h3>Settings of {escape(run.summary.scenario)}</h3>"
+            yield f'<p class="soft">The resolved scenario ({escape("scenario.toml")}); '
+            yield "<code>proxcgal run</code> takes this file as it is.</p>"
+            yield f"<pre>{escape(run.settings)}</pre>"
+    yield "</body></html>"
+
+
+def _introduction(runs: Sequence[Run]) -> Iterator[str]:
+    robots = ", ".join(sorted({str(run.summary.robot) for run in runs}))
+    seeds = ", ".join(sorted({str(run.summary.seed) for run in runs}))
+    yield (
+        f"<p>A simulated arm ({escape(robots)}, seed {escape(seeds)}) with rings of 8 x 8 zone "
+        "time-of-flight sensors is sent to a goal that lies beyond an obstacle. Each scene is run "
+        "by several controllers that differ in one thing: what the avoidance may move. "
+        "<code>wb</code> moves the surface point nearest to the obstacle, on any link, covered "
+        "with sensors or not; <code>sm</code>, the baseline, only the sensors' own mounting "
+        "points; <code>wb_known</code> is <code>wb</code> with points of the scene itself in place "
+        "of the sensors: the ceiling, not a result of ours.</p>"
+    )
+
+
+def _table(runs: Sequence[Run]) -> Iterator[str]:
+    yield '<div class="scroll"><table><caption>True distances are exact meshes against the exact '
+    yield "scene; final is the mean of the last 2 s; a violation is a tick under 0.05 m. The paper "
+    yield "gives curves and one number for all its experiments, no table.</caption>"
+    yield '<thead><tr><th class="left">scene</th><th class="left">controller</th>'
+    for name, unit in (
+        ("true min", "m"),
+        ("true final", "m"),
+        ("seen min", "m"),
+        ("goal error", "m"),
+        ("violations", "ticks"),
+        ("gain", "mm, wb over sm"),
+    ):
+        yield f"<th>{name}<small>{unit}</small></th>"
+    yield '<th class="left">the paper</th></tr></thead><tbody>'
+    for run in runs:
+        controllers = run.summary.controllers
+        for row, (name, numbers) in enumerate(controllers.items()):
+            yield "<tr>"
+            if row == 0:
+                span = f' rowspan="{len(controllers)}"'
+                yield f'<td class="left"{span}>{escape(run.summary.scenario)}</td>'
+            yield f'<td class="left">{escape(NAMES.get(name, name))}</td>'
+            for value in (
+                numbers.true_min_m,
+                numbers.true_final_m,
+                numbers.seen_min_m,
+                numbers.goal_error_m,
+            ):
+                yield f"<td>{shown(value)}</td>"
+            yield f"<td>{'-' if numbers.violations is None else numbers.violations}</td>"
+            if row == 0:
+                gain = run.summary.gain_mm
+                paper = escape(PAPER.get(run.summary.scenario, "-"))
+                yield f"<td{span}>{'-' if gain is None else f'{gain:+.0f}'}</td>"
+                yield f'<td class="text"{span}>{paper}</td>'
+            yield "</tr>"
+    yield "</tbody></table></div>"
+
+
+def _verdict(runs: Sequence[Run]) -> Iterator[str]:
+    for run in runs:
+        own = run.summary.self_min_m
+        if run.summary.failed:
+            yield (
+                f'<p class="bad">{escape(run.summary.scenario)}: failed: the arm came within '
+                f"{shown(own)} m of itself, allowed is {SELF_LIMIT_M} m.</p>"
+            )
+    yield (
+        '<p class="soft">Reaching the goal is not asked for: it lies beyond the obstacle, and '
+        "keeping the distance comes first. These are engineering figures from a simulation, not "
+        "a certificate of any kind.</p>"
+    )
+
+
+def _picture(path: Path, caption: str, budget: int) -> tuple[str, int]:
+    """The figure with its picture inside, and the bytes that it takes of the page."""
+    if not path.is_file():
+        return "", 0
+    size = 4 * ((path.stat().st_size + 2) // 3)
+    if size > budget:
+        text = f"left out here to keep the page under {MAX_BYTES // 1_000_000} MB"
+        return f'<p class="soft">{escape(path.name)}: {text}.</p>', 0
+    kind = "gif" if path.suffix == ".gif" else "png"
+    data = base64.b64encode(path.read_bytes()).decode()
+    alt = escape(caption.split(". ")[0], quote=True)
+    part = f'<figure><img src="data:image/{kind};base64,{data}" alt="{alt}">'
+    return part + f"<figcaption>{escape(caption)}</figcaption></figure>", size
+
+
+def _trials(run: Run) -> Iterator[str]:
+    """Timings, modes and findings per trial."""
+    if not run.about.trials:
+        return
+    yield '<div class="scroll"><table><caption>Time of one tick (perception and control, from '
+    yield "Python), least distance between own links, and what the monitor found "
+    yield "(reason: ticks).</caption>"
+    yield '<thead><tr><th class="left">controller</th><th>tick median<small>us</small></th>'
+    yield "<th>tick p99<small>us</small></th><th>wall<small>s</small></th>"
+    yield '<th>own links<small>m</small></th><th class="left">findings</th></tr></thead><tbody>'
+    for name, trial in run.about.trials.items():
+        numbers = run.summary.controllers.get(name, Numbers())
+        found = ", ".join(f"{reason}: {ticks}" for reason, ticks in trial.findings.items())
+        yield (
+            f'<tr><td class="left">{escape(name)}</td><td>{trial.tick_median_us:.0f}</td>'
+            f"<td>{trial.tick_p99_us:.0f}</td><td>{trial.wall_s:.1f}</td>"
+            f"<td>{shown(numbers.self_min_m)}</td>"
+            f'<td class="text">{escape(found) or "none"}</td></tr>'
+        )
+    yield "</tbody></table></div>"
+
+
+def _recordings(run: Run) -> Iterator[str]:
+    files = sorted(run.folder.glob("*.mcap"))
+    if files:
+        names = ", ".join(f"<code>{escape(f.name)}</code>" for f in files)
+        yield f'<p class="soft">Recordings of every tick beside this page: {names}. '
+        yield "<code>proxcgal replay FILE</code> steps through one; Foxglove opens them.</p>"
+
+
+def _origin(about: About) -> Iterator[str]:
+    yield "<h2>How this was made</h2>"
+    if about.command:
+        yield f'<pre class="wrap">{escape(about.command)}</pre>'
+    rows = [("made", about.made), ("commit", about.commit), ("machine", about.machine)]
+    rows += about.versions.items()
+    yield "<table><tbody>"
+    for name, value in rows:
+        if value:
+            yield f'<tr><td class="left">{escape(name)}</td>'
+            yield f'<td class="left">{escape(value)}</td></tr>'
+    yield '<tr><td class="left">[WA]</td><td class="left">S. Borelli et al., Generating '
+    yield "Whole-Arm Avoidance Motion Through Localized Proximity Sensing, IEEE/ASME Trans. "
+    yield "Mechatronics, 2025, doi:10.1109/TMECH.2025.3582432</td></tr></tbody></table>"

@@ -1,0 +1,51 @@
+"""`proxcgal report`: a folder of results becomes one self-contained HTML page."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from proxcgal.study.analysis import write_text
+
+
+@dataclass(frozen=True)
+class ReportOptions:
+    """Write DIR/report.html: one self-contained page of the results in DIR.
+
+    Examples:
+      proxcgal report out/demo
+      proxcgal report out/front_plane
+    """
+
+    dir: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR")]
+    """A folder that `proxcgal run` or `proxcgal demo` wrote."""
+
+
+def report_command(options: ReportOptions, command: str) -> int:
+    """Writes the page; prints its path."""
+    print(write_report(options.dir))
+    return 0
+
+
+def write_report(folder: Path) -> Path:
+    """Writes `report.html` of a folder of results, from what lies in it.
+
+    Args:
+        folder: of one run, or of several scenarios' runs (one sub-folder each).
+
+    Returns:
+        Path of the page: at most 10 MB, pictures inside, nothing fetched from anywhere.
+
+    Raises:
+        ConfigError: no such folder, no `summary.json` in it, or files that cannot be read.
+    """
+    from proxcgal.apps.page import page
+    from proxcgal.apps.stored import read_runs
+
+    runs, about = read_runs(folder)
+    path = folder / "report.html"
+    write_text(path, page(runs, about))
+    return path

@@ -1,0 +1,1 @@
+"""Many trials: workers, numbers and figures."""
