@@ -1,0 +1,125 @@
+#pragma once
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "proxcgal/pipeline/command.hpp"
+#include "proxcgal/pipeline/distance.hpp"
+#include "proxcgal/pipeline/filter.hpp"
+#include "proxcgal/pipeline/sense.hpp"
+#include "proxcgal/pipeline/solve.hpp"
+#include "proxcgal/pipeline/task.hpp"
+#include "proxcgal/robot.hpp"
+#include "proxcgal/safety/monitor.hpp"
+
+namespace proxcgal {
+
+/// What the avoidance task moves.
+enum class ControlPoint : std::uint8_t {
+  kWholeBody,  ///< the surface point nearest to the cloud, any link
+  kSensor,     ///< the mounting point of the sensor nearest to the cloud (SM baseline)
+};
+
+/// When a point that passed the filter is believed.
+enum class Confirmation : std::uint8_t {
+  kOff,
+  kZones,  ///< a neighbouring zone of the same scan sees a similar range
+  kScans,  ///< the zone saw a similar range in one of the last two scans as well
+};
+
+struct FilterConfig {
+  double tolerance = 0.02;     ///< [m] epsilon of Algorithm 1
+  double sigmas = 4.0;         ///< the tolerance is at least this many sigma(range)
+  double min_hit = 0.005;      ///< [m] nearer hits are the sensor's own mounting
+  bool surface_margin = true;  ///< also drop what lies that near to any link's surface
+  Confirmation confirmation = Confirmation::kOff;
+  double z_min = -kInfinity;  ///< [m] world height below which points are cropped (floor)
+  void validate() const;
+};
+
+struct ControllerConfig {
+  ControlPoint control_point = ControlPoint::kWholeBody;
+  std::vector<TaskSpec> tasks = {Avoidance{}, Reach{}};  ///< the order is the priority
+  FilterConfig filter;
+  SolverConfig solver;
+  MonitorConfig monitor;
+  double period = 0.01;                  ///< [s] nominal time from tick to tick
+  double min_row_norm = 0.05;            ///< a link whose row n'J is smaller is passed over
+  std::vector<std::string> avoid_links;  ///< empty: every link that some joint moves
+  Method method = Method::kFast;
+  int max_points = 200000;  ///< storage for known points, made at set-up
+  bool timings = false;
+
+  /// @throws ConfigError  with the field, its value and what is allowed
+  void validate() const;
+};
+
+/// What one task wanted and got.
+struct TaskReport {
+  const char* name = "";
+  RowVector rate, activation, residual;
+};
+
+struct Timings {
+  double sense_us = 0, filter_us = 0, distance_us = 0, solve_us = 0, total_us = 0;
+};
+
+/// Everything one tick tells. Reused: copy what you keep.
+struct TickOutput {
+  JointVector qd;                   ///< [rad/s] or [m/s] admissible velocity
+  std::optional<ClosestPair> pair;  ///< that drives the arm; its point is a row of `cloud_W`
+  PointOrigin pair_origin;          ///< sensor and zone that saw it, where one did
+  ControlPair control;              ///< what the first avoidance row acts on
+  Mode mode = Mode::kRun;
+  int n_tasks = 0;
+  std::array<TaskReport, kMaxLevels> tasks;
+  Timings timings;
+};
+
+/// The tick: sense -> filter -> distance -> task -> solve -> command, under the monitor.
+///
+/// Set-up throws; a tick never throws, allocates, locks, logs, or reads a clock for a decision.
+/// Not thread-safe: one controller, one thread.
+class Controller {
+ public:
+  /// @param robot  kept alive by the controller
+  /// @throws ConfigError  every setting that is out of bounds, a sensor on an unknown link
+  Controller(std::shared_ptr<const Robot> robot, Skin skin, ControllerConfig config);
+  ~Controller();
+
+  /// @param time   [s] the caller's monotonic clock
+  /// @param q      (n_q,) measured
+  /// @param scans  since the last tick, may be empty
+  /// @param goal   T_WT
+  /// @param late   the caller missed its deadline since the last tick
+  const TickOutput& tick(double time, const JointVector& q, std::span<const Scan> scans,
+                         const Pose& goal, bool late = false);
+  /// The scene itself instead of scans.
+  /// @param points_W    (n, 3), n <= max_points
+  /// @param velocity_W  of the obstacle, zero where it is not known [m/s]
+  const TickOutput& tick_known(double time, const JointVector& q, const PointsRef& points_W,
+                               const Pose& goal, const Vector3& velocity_W = Vector3::Zero());
+
+  /// @name State of the last tick
+  /// @{
+  std::span<const Finding> findings() const;
+  Eigen::Map<const Points> cloud_W() const;  ///< filtered: what the arm avoids
+  std::span<const PointOrigin> cloud_origins() const;
+  /// Every point of the sensors' last scans before body removal, in world.
+  Eigen::Map<const Points> raw_cloud_W() const;
+  std::vector<double> scan_ages(double time) const;  ///< [s] per sensor, infinity where none came
+  /// @}
+
+  const Robot& robot() const;
+  const Skin& skin() const;
+  const ControllerConfig& config() const;
+  /// Leaves STOP, only once its cause is gone; true where it did.
+  bool reset();
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace proxcgal

@@ -1,0 +1,31 @@
+#pragma once
+#include <stdexcept>
+#include <string>
+
+namespace proxcgal {
+
+/// Root of everything that set-up may throw. The tick throws nothing: it returns findings.
+class ProxError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// A setting that is out of bounds or contradicts another.
+class ConfigError : public ProxError {
+ public:
+  using ProxError::ProxError;
+};
+
+/// A robot description that cannot be turned into a robot.
+class ModelError : public ProxError {
+ public:
+  using ProxError::ProxError;
+};
+
+/// A mesh, point or array that no query can be asked of.
+class GeometryError : public ProxError {
+ public:
+  using ProxError::ProxError;
+};
+
+}  // namespace proxcgal

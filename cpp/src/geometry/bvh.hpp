@@ -1,0 +1,59 @@
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "proxcgal/geometry/mesh_tree.hpp"
+#include "proxcgal/types.hpp"
+
+namespace proxcgal::detail {
+
+// Four lanes at a time, whatever the processor offers: the compiler maps them.
+using Float4 = float __attribute__((vector_size(16)));
+using Double4 = double __attribute__((vector_size(32)));
+using Mask4 = std::int64_t __attribute__((vector_size(32)));
+
+inline constexpr int kWide = 4;
+
+/// Four children: boxes in single precision, one lane a child. Queries widen them by what
+/// rounding can cost, so a box never hides a triangle that double precision would find.
+struct alignas(64) BvhNode {
+  Float4 low[3];
+  Float4 high[3];
+  std::int32_t child[kWide];  ///< >= 0 a node, < 0 a leaf: ~row of its block; kEmpty for none
+};
+inline constexpr std::int32_t kEmpty = INT32_MIN;
+
+/// Four triangles in double precision, one lane each; short leaves repeat their last triangle.
+struct alignas(32) TriangleBlock {
+  Double4 a[3], b[3], c[3];
+  Double4 inv_ab, inv_ac, inv_bc;  ///< 1 / squared edge length
+  Double4 inv_gram;                ///< 1 / (4 area^2), 0 for slivers: their edges serve
+  std::int32_t id[kWide];
+};
+
+/// Flat four-wide tree over a link's triangles: what the tick walks.
+class Bvh {
+ public:
+  Bvh(const Points& vertices, const Triangles& triangles);
+
+  /// Nearest surface point strictly within `squared_bound`; triangle -1 where there is none.
+  SurfacePoint nearest(const Vector3& point, double squared_bound, int hint) const;
+  bool within(const Vector3& point, double squared_radius) const;
+  bool any_hit(const Vector3& origin, const Vector3& direction, double t_min, double t_max) const;
+  double first_hit(const Vector3& origin, const Vector3& direction, double t_min) const;
+  /// Squared distance to another surface whose frame has pose T_LO in this one's.
+  double squared_distance(const Bvh& other, const Pose& T_LO, double squared_bound,
+                          Vector3* on_this, Vector3* on_other) const;
+
+ private:
+  struct Builder;
+  template <bool kAnyHit>
+  double trace(const Vector3& origin, const Vector3& direction, double t_min, double t_max) const;
+
+  std::vector<BvhNode> nodes_;  // root first
+  std::vector<TriangleBlock> blocks_;
+  std::vector<std::int32_t> block_of_;  // triangle -> its block, for hints
+  double scale_ = 0.0;                  // largest coordinate: sets the rounding allowance
+};
+
+}  // namespace proxcgal::detail
