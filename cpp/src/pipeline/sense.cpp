@@ -1,0 +1,95 @@
+#include "proxcgal/pipeline/sense.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "proxcgal/error.hpp"
+
+namespace proxcgal {
+namespace {
+
+constexpr int kSide = 8;
+
+// Status codes of the VL53L8CX (ST UM3109): 5 is a valid range; 6 and 9 are about half trusted.
+constexpr std::uint8_t kValid = 5, kWrapNotChecked = 6, kLargePulse = 9, kNoTarget = 255;
+constexpr double kUncertainSigma = 2.0;  // how much wider an uncertain range is taken to be
+
+double zone_angle(int index, double field_of_view) {
+  return (index - 0.5 * (kSide - 1)) * field_of_view / kSide;
+}
+
+}  // namespace
+
+void SensorModel::validate() const {
+  const auto require = [](bool ok, const char* field, double value, const char* allowed) {
+    if (!ok) {
+      throw ConfigError(std::string("sensor model: ") + field + " is " + std::to_string(value) +
+                        ", allowed is " + allowed);
+    }
+  };
+  require(field_of_view > 0.0 && field_of_view < 3.0, "field_of_view", field_of_view, "0 to 3 rad");
+  require(min_range >= 0.0, "min_range", min_range, "0 m or more");
+  require(std::isfinite(max_range) && max_range > min_range, "max_range", max_range,
+          "above min_range [m]");
+  require(workspace > 0.0, "workspace", workspace, "above 0 m");
+  require(std::isfinite(sigma_floor) && sigma_floor >= 0.0, "sigma_floor", sigma_floor,
+          "0 m or more");
+  require(std::isfinite(sigma_ratio) && sigma_ratio >= 0.0, "sigma_ratio", sigma_ratio,
+          "0 or more");
+}
+
+double SensorModel::sigma(double range) const { return std::max(sigma_floor, sigma_ratio * range); }
+
+Sense::Sense(const SensorModel& model) : model_(model) {
+  model.validate();
+  for (int zone = 0; zone < kZones; ++zone) {
+    const double alpha = zone_angle(zone % kSide, model.field_of_view);
+    const double beta = zone_angle(zone / kSide, model.field_of_view);
+    const auto row = static_cast<std::size_t>(zone);
+    // Equation (1). The sensor reports the distance along z, so x is d tan(alpha) where the paper
+    // prints d sin(alpha): docs/sources.md.
+    x_per_range_[row] =
+        model.range_model == RangeModel::kPrinted ? std::sin(alpha) : std::tan(alpha);
+    y_per_range_[row] = std::tan(beta);
+  }
+}
+
+ZoneState Sense::classify(double range, std::uint8_t status) const {
+  if (status == kNoTarget) return ZoneState::kEmpty;
+  if (status != kValid && status != kWrapNotChecked && status != kLargePulse)
+    return ZoneState::kInvalid;
+  // Written so that a NaN is invalid; zero is neither contact nor free.
+  if (!(range >= model_.min_range && range <= model_.max_range && range > 0.0))
+    return ZoneState::kInvalid;
+  return status == kValid ? ZoneState::kTarget : ZoneState::kUncertain;
+}
+
+Vector3 Sense::point(int zone, double range) const {
+  const auto row = static_cast<std::size_t>(zone);
+  return {range * x_per_range_[row], range * y_per_range_[row], range};
+}
+
+void Sense::operator()(const Scan& scan, SensedPoints& out) const {
+  out.count = 0;
+  out.invalid = 0;
+  out.first_invalid_zone = -1;
+  for (int zone = 0; zone < kZones; ++zone) {
+    const double range = scan.ranges[static_cast<std::size_t>(zone)];
+    const ZoneState state = classify(range, scan.status[static_cast<std::size_t>(zone)]);
+    if (state == ZoneState::kInvalid) {
+      if (out.invalid++ == 0) out.first_invalid_zone = zone;
+    }
+    if (state != ZoneState::kTarget && state != ZoneState::kUncertain) continue;
+    const Vector3 point_S = point(zone, range);
+    const double along_ray = point_S.norm();
+    if (along_ray > model_.workspace) continue;
+    const auto i = static_cast<std::size_t>(out.count++);
+    out.point_S[i] = point_S;
+    out.zone[i] = static_cast<std::uint8_t>(zone);
+    // The noise is that of the range; along the slanted ray it is longer by the same factor.
+    out.sigma[i] = model_.sigma(range) * (along_ray / range) *
+                   (state == ZoneState::kUncertain ? kUncertainSigma : 1.0);
+  }
+}
+
+}  // namespace proxcgal

@@ -1,0 +1,127 @@
+#include "proxcgal/safety/monitor.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "proxcgal/error.hpp"
+
+namespace proxcgal {
+
+void MonitorConfig::validate() const {
+  const auto require = [](bool ok, const char* field, double value, const char* allowed) {
+    if (!ok) {
+      throw ConfigError(std::string("monitor: ") + field + " is " + std::to_string(value) +
+                        ", allowed is " + allowed);
+    }
+  };
+  require(degraded_after > 0.0, "degraded_after", degraded_after, "above 0 s");
+  require(hold_after > 0.0, "hold_after", hold_after, "above 0 s");
+  require(degraded_scale >= 0.0 && degraded_scale <= 1.0, "degraded_scale", degraded_scale,
+          "0 to 1");
+  require(clean_cycles >= 1, "clean_cycles", clean_cycles, "1 or more");
+  require(missed_deadlines >= 1, "missed_deadlines", missed_deadlines, "1 or more");
+}
+
+Mode mode_of(Reason reason) {
+  switch (reason) {
+    case Reason::kJointStateInvalid:
+      return Mode::kStop;
+    case Reason::kAllSensorsSilent:
+    case Reason::kNoControllableLink:
+    case Reason::kGoalInvalid:
+    case Reason::kDeadlinesMissed:
+      return Mode::kHold;
+    case Reason::kSensorSilent:
+    case Reason::kPointsInvalid:
+      return Mode::kDegraded;
+    case Reason::kScanRefused:
+    case Reason::kZoneInvalid:
+    case Reason::kTimeInvalid:
+    case Reason::kLinkSkipped:
+    case Reason::kRowSmall:
+    case Reason::kNotExecuted:
+    case Reason::kOutsideLimits:
+    case Reason::kDeadlineMissed:
+      return Mode::kRun;  // told, and dealt with where it was found
+  }
+  return Mode::kStop;
+}
+
+const char* reason_name(Reason reason) {
+  switch (reason) {
+    case Reason::kSensorSilent:
+      return "sensor_silent";
+    case Reason::kAllSensorsSilent:
+      return "all_sensors_silent";
+    case Reason::kScanRefused:
+      return "scan_refused";
+    case Reason::kZoneInvalid:
+      return "zone_invalid";
+    case Reason::kJointStateInvalid:
+      return "joint_state_invalid";
+    case Reason::kGoalInvalid:
+      return "goal_invalid";
+    case Reason::kTimeInvalid:
+      return "time_invalid";
+    case Reason::kNoControllableLink:
+      return "no_controllable_link";
+    case Reason::kLinkSkipped:
+      return "link_skipped";
+    case Reason::kRowSmall:
+      return "row_small";
+    case Reason::kNotExecuted:
+      return "not_executed";
+    case Reason::kOutsideLimits:
+      return "outside_limits";
+    case Reason::kDeadlineMissed:
+      return "deadline_missed";
+    case Reason::kDeadlinesMissed:
+      return "deadlines_missed";
+    case Reason::kPointsInvalid:
+      return "points_invalid";
+  }
+  return "unknown";
+}
+
+Monitor::Monitor(const MonitorConfig& config) : config_(config) { config.validate(); }
+
+void Monitor::begin() {
+  count_ = 0;
+  wanted_ = Mode::kRun;
+}
+
+void Monitor::add(const Finding& finding) {
+  wanted_ = std::max(wanted_, mode_of(finding.reason));
+  // Past the room there is, the mode still counts the finding; only its details are lost.
+  if (count_ < kMaxFindings) findings_[static_cast<std::size_t>(count_++)] = finding;
+}
+
+void Monitor::deadline(bool late) {
+  late_ = late ? late_ + 1 : 0;
+  if (!late) return;
+  Finding finding;
+  finding.reason =
+      late_ >= config_.missed_deadlines ? Reason::kDeadlinesMissed : Reason::kDeadlineMissed;
+  finding.count = late_;
+  add(finding);
+}
+
+Mode Monitor::conclude() {
+  if (mode_ == Mode::kStop) return mode_;
+  clean_ = wanted_ < mode_ ? clean_ + 1 : 0;
+  if (wanted_ > mode_ || clean_ >= config_.clean_cycles) {
+    mode_ = wanted_;
+    clean_ = 0;
+  }
+  return mode_;
+}
+
+bool Monitor::reset() {
+  if (mode_ != Mode::kStop || wanted_ == Mode::kStop) return false;
+  mode_ = Mode::kHold;  // and on to RUN by clean cycles
+  clean_ = 0;
+  return true;
+}
+
+}  // namespace proxcgal
