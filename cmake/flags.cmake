@@ -3,10 +3,13 @@
 add_library(proxcgal_flags INTERFACE)
 target_compile_options(
   proxcgal_flags
-  INTERFACE -ffp-contract=off -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
+  INTERFACE -ffp-contract=off -Wall -Wextra -Wpedantic -Wshadow=local -Wnon-virtual-dtor
             -Woverloaded-virtual -Wdouble-promotion -Wvla
             $<$<BOOL:${PROXCGAL_MARCH}>:-march=${PROXCGAL_MARCH}>)
-# No -Wconversion: Eigen's rows and columns are signed, the standard library's sizes are not.
+# Left out on purpose: -Wconversion, as Eigen's sizes are signed and the standard library's are not;
+# -Wmissing-field-initializers, as a field that is not named keeps its default; -Wpsabi, as wide
+# vectors pass between functions of one library only.
+target_compile_options(proxcgal_flags INTERFACE -Wno-missing-field-initializers -Wno-psabi)
 
 if(PROXCGAL_SANITIZE)
   target_compile_options(proxcgal_flags INTERFACE -fsanitize=${PROXCGAL_SANITIZE}
