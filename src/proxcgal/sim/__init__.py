@@ -1,0 +1,1 @@
+"""Scenarios, the simulated world, one run and its durable log."""

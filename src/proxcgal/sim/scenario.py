@@ -1,0 +1,142 @@
+"""Scenario files: one TOML file says what is simulated; every problem in it is told at once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field, ValidationError
+
+from proxcgal.errors import ConfigError
+from proxcgal.sim import toml
+from proxcgal.sim.scenario_keys import (
+    Controller,
+    Fault,
+    Goal,
+    Limits,
+    Obstacle,
+    Positive,
+    Section,
+    Simulation,
+    Skin,
+)
+from proxcgal.sim.scenario_problems import lines
+
+#: wb: whole body; sm: sensor points; wb_known: whole body on points of the scene itself.
+CONTROLLERS = ("wb", "sm", "wb_known")
+
+
+class Scenario(Section):
+    """A scene that stands still, a robot with its sensors, and what it is to do."""
+
+    name: str = Field("unnamed", description="left out in a file: the file's own name")
+    description: str = Field("", description="one line, shown in lists")
+    kind: Literal["static"] = Field(description="what kind of scene this is")
+    robot: str = Field(description="a built-in robot's name, or a path to .urdf or .xml")
+    package_dirs: tuple[str, ...] = Field(
+        (), description="where package:// paths of the robot's file are looked up"
+    )
+    vertices_per_link: int = Field(
+        1000, ge=0, description="of the controller's meshes, 0: as they are; the simulator's are"
+    )
+    q0: tuple[float, ...] = Field(min_length=1, description="[rad] or [m] joint positions at 0 s")
+    duration: Positive = Field(description="[s]")
+    perception: Literal["sensed", "known"] = Field(
+        "sensed", description="what the controller gets: scans, or points of the scene itself"
+    )
+    seed: int = Field(0, ge=0, description="fixes every random draw")
+    goal: Goal
+    limits: Limits = Field(default_factory=Limits)
+    skin: Skin
+    controller: Controller = Field(default_factory=Controller)
+    simulation: Simulation = Field(default_factory=Simulation)
+    obstacles: tuple[Obstacle, ...] = Field((), alias="obstacle")
+    faults: tuple[Fault, ...] = Field((), alias="fault")
+
+    def to_toml(self) -> str:
+        """The file that gives this scenario again, with every default written out."""
+        return toml.write(self.model_dump(by_alias=True))
+
+
+#: The class of each `kind`.
+KINDS: dict[str, type[Scenario]] = {"static": Scenario}
+
+
+def list_scenarios() -> dict[str, str]:
+    """Names of the built-in scenarios, with a line on each."""
+    listed = {}
+    for path in _built_in():
+        table = toml.parse(path.read_text(encoding="utf-8"), path.name)
+        listed[path.stem] = str(table.get("description", ""))
+    return listed
+
+
+def load_scenario(name_or_path: str | Path, overrides: Sequence[str] = ()) -> Scenario:
+    """Reads a built-in scenario by name, or a file.
+
+    Args:
+        name_or_path: a name of `list_scenarios`, or a path to a TOML file.
+        overrides: `key.sub=value`, applied in order after the file.
+
+    Raises:
+        ConfigError: all that is wrong, one line each: file, key, value, what is allowed.
+    """
+    built_in = {path.stem: path for path in _built_in()}
+    path = built_in.get(str(name_or_path), Path(name_or_path))
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "not a text file"
+        raise ConfigError(
+            f"scenario {str(name_or_path)!r}: {reason}; a path to a TOML file or one of: "
+            f"{', '.join(sorted(built_in))}"
+        ) from None
+    table = toml.parse(text, str(path))
+    table.setdefault("name", path.stem)
+    _anchor(table, path.parent)
+    return _checked(table, str(path), overrides)
+
+
+def parse_scenario(text: str, origin: str, overrides: Sequence[str] = ()) -> Scenario:
+    """The scenario of a TOML text, such as a recording carries. Raises: as `load_scenario`."""
+    return _checked(toml.parse(text, origin), origin, overrides)
+
+
+def change_scenario(scenario: Scenario, origin: str, overrides: Sequence[str]) -> Scenario:
+    """A scenario with some keys changed. Raises: as `load_scenario`."""
+    return parse_scenario(scenario.to_toml(), origin, overrides) if overrides else scenario
+
+
+def _checked(table: dict[str, Any], origin: str, overrides: Sequence[str]) -> Scenario:
+    for assignment in overrides:
+        toml.override(table, assignment)
+    kind = table.get("kind", "static")
+    model = KINDS.get(kind, Scenario) if isinstance(kind, str) else Scenario
+    try:
+        return model.model_validate(_tuples(table))
+    except ValidationError as error:
+        keys = [assignment.partition("=")[0].strip() for assignment in overrides]
+        raise ConfigError("\n".join(lines(model, error, origin, keys))) from None
+
+
+def _built_in() -> list[Path]:
+    folder = Path(str(resources.files("proxcgal"))) / "scenarios"
+    return sorted(folder.glob("*.toml"))
+
+
+def _anchor(table: dict[str, Any], folder: Path) -> None:
+    """Paths in a file are relative to that file, wherever it is read from."""
+    robot = table.get("robot")
+    if isinstance(robot, str) and Path(robot).suffix in (".urdf", ".xml"):
+        table["robot"] = str((folder / robot).absolute())
+    places = table.get("package_dirs")
+    if isinstance(places, list) and all(isinstance(place, str) for place in places):
+        table["package_dirs"] = [str((folder / place).absolute()) for place in places]
+
+
+def _tuples(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _tuples(item) for key, item in value.items()}
+    return tuple(_tuples(item) for item in value) if isinstance(value, list | tuple) else value

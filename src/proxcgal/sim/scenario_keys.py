@@ -1,0 +1,296 @@
+"""The keys of a scenario file: their types, bounds, units and defaults.
+
+SI units and radians; a default that the C++ core has is taken from there, never repeated.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+
+from proxcgal import _core
+from proxcgal.sim import boxes
+
+TaskName = Literal["avoidance", "reach", "joint_limits", "minimum_altitude", "manipulability"]
+FaultKind = Literal[
+    "silent", "frozen", "stuck_payload", "nan", "zero", "dropout", "offset", "delay"
+]
+#: What `value` means to a fault, and what it is where the file leaves it out; others take none.
+FAULT_VALUES: dict[str, tuple[str, float]] = {
+    "dropout": ("share of zones lost, 0 to 1", 0.5),
+    "offset": ("added to every range [m]", 0.05),
+    "delay": ("scans arrive this much later [s]", 0.1),
+}
+
+
+def _not_nan(value: float) -> float:
+    if math.isnan(value):
+        raise ValueError("must not be nan")
+    return value
+
+
+Positive = Annotated[float, Field(gt=0)]
+NonNegative = Annotated[float, Field(ge=0)]
+Share = Annotated[float, Field(ge=0, le=1)]
+Count = Annotated[int, Field(ge=1)]
+Vector = Annotated[tuple[float, ...], Field(min_length=3, max_length=3)]
+Size = Annotated[tuple[Positive, ...], Field(min_length=3, max_length=3)]
+#: May be infinite: a bound that is off.
+Bound = Annotated[float, Field(allow_inf_nan=True), AfterValidator(_not_nan)]
+
+
+def _like(struct: str, attribute: str, description: str) -> Any:
+    """A field whose default is that of the core's struct."""
+
+    def default() -> Any:
+        value = getattr(getattr(_core, struct)(), attribute)
+        return tuple(value) if isinstance(value, list) else value
+
+    return Field(default_factory=default, description=description)
+
+
+class Section(BaseModel):
+    """A table of the file: unknown keys are errors, values are not converted, nothing changes."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Goal(Section):
+    """Where the tool is to go: exactly one of `offset` and `position`."""
+
+    offset: Vector | None = Field(
+        None, description="[m] in the base frame, from where the tool starts, orientation kept"
+    )
+    position: Vector | None = Field(None, description="[m] of the tool, in the base frame")
+    rpy: Vector | None = Field(
+        None, description="[rad] roll, pitch, yaw beside `position`; left out: orientation kept"
+    )
+
+    @model_validator(mode="after")
+    def _one_form(self) -> Self:
+        if (self.offset is None) == (self.position is None):
+            raise ValueError("needs exactly one of offset and position")
+        if self.offset is not None and self.rpy is not None:
+            raise ValueError("rpy goes with position, offset keeps the orientation")
+        return self
+
+
+class Ring(Section):
+    """Rings of sensors round one link."""
+
+    link: str = Field(description="name of a link that carries a mesh")
+    at: tuple[Share, ...] = Field(
+        min_length=1, description="one ring at each of these fractions of the link's length"
+    )
+    sensors: Count = Field(description="evenly round each ring")
+
+
+class Sensor(Section):
+    """What the controller takes a sensor for (VL53L8CX)."""
+
+    field_of_view: Annotated[float, Field(gt=0, lt=math.pi)] = _like(
+        "SensorModel", "field_of_view", "[rad] along one side of the 8 x 8 zones"
+    )
+    min_range: NonNegative = _like("SensorModel", "min_range", "[m] along the sensor's z axis")
+    max_range: Positive = _like("SensorModel", "max_range", "[m] along the sensor's z axis")
+    workspace: Positive = _like(
+        "SensorModel", "workspace", "[m] along the ray; farther points are cropped"
+    )
+    sigma_floor: NonNegative = _like(
+        "SensorModel", "sigma_floor", "[m] least standard deviation the filter reckons with"
+    )
+    sigma_ratio: NonNegative = _like(
+        "SensorModel", "sigma_ratio", "of the range, where that is more than the floor"
+    )
+    range_model: Literal["tangent", "printed"] = _like(
+        "SensorModel", "range_model", "form of [WA] eq. (1)"
+    )
+
+
+class Skin(Section):
+    """The sensors on the robot."""
+
+    rings: tuple[Ring, ...] = Field(min_length=1, description="at least one")
+    sensor: Sensor = Field(default_factory=Sensor)
+
+
+class Filter(Section):
+    """Body removal."""
+
+    tolerance: NonNegative = _like("FilterConfig", "tolerance", "[m] epsilon of Algorithm 1")
+    sigmas: NonNegative = _like(
+        "FilterConfig", "sigmas", "the tolerance is at least this many sigma(range)"
+    )
+    min_hit: NonNegative = _like(
+        "FilterConfig", "min_hit", "[m] nearer hits are the sensor's own mounting"
+    )
+    surface_margin: bool = _like(
+        "FilterConfig", "surface_margin", "also drop what lies that near to any link"
+    )
+    confirmation: Literal["off", "zones", "scans"] = _like(
+        "FilterConfig", "confirmation", "believe a point only when seen twice"
+    )
+    z_min: Bound = _like("FilterConfig", "z_min", "[m] points below are cropped (floor)")
+
+
+class Solver(Section):
+    """The task-priority solver."""
+
+    damping: NonNegative = _like("SolverConfig", "damping", "lambda")
+    damping_threshold: NonNegative = _like(
+        "SolverConfig", "damping_threshold", "s_th; singular values below are damped"
+    )
+    eta: NonNegative = _like("SolverConfig", "eta", "cost of leaving the upper levels' freedom")
+    form: Literal["literal", "code"] = _like("SolverConfig", "form", "of the damped inverse")
+
+
+class Monitor(Section):
+    """Freshness bounds."""
+
+    degraded_after: Positive = _like(
+        "MonitorConfig", "degraded_after", "[s] age of one sensor's scan that slows the arm"
+    )
+    hold_after: Positive = _like(
+        "MonitorConfig", "hold_after", "[s] age of all sensors' scans that holds the arm"
+    )
+    degraded_scale: Share = _like(
+        "MonitorConfig", "degraded_scale", "of the speed limits while degraded"
+    )
+    clean_cycles: Count = _like(
+        "MonitorConfig", "clean_cycles", "cycles without a cause before a mode clears"
+    )
+    missed_deadlines: Count = _like(
+        "MonitorConfig", "missed_deadlines", "in a row, before the arm holds"
+    )
+
+
+class JointLimits(Section):
+    """Task `joint_limits`."""
+
+    gain: Positive = _like("JointLimits", "gain", "[1/s] towards the middle")
+    margin: Positive = _like("JointLimits", "margin", "[rad] or [m] where it begins to act")
+
+
+class MinimumAltitude(Section):
+    """Task `minimum_altitude`."""
+
+    height: float = _like("MinimumAltitude", "height", "[m] the tool is to stay above")
+    buffer: Positive = _like("MinimumAltitude", "buffer", "[m] above it, where it begins to act")
+    gain: Positive = _like("MinimumAltitude", "gain", "[1/s]")
+
+
+class Manipulability(Section):
+    """Task `manipulability`."""
+
+    target: Positive = _like("Manipulability", "target", "the rate pulls towards it")
+    low: Positive = _like("Manipulability", "low", "fully active below")
+    high: Positive = _like("Manipulability", "high", "inactive above")
+    gain: Positive = _like("Manipulability", "gain", "[1/s]")
+
+
+class Controller(Section):
+    """The control law, the same for the whole body and for the sensor points."""
+
+    d_min: Positive = _like("Avoidance", "d_min", "[m] distance to keep")
+    buffer: Positive = _like("Avoidance", "buffer", "[m] Delta: avoidance fades in over it")
+    avoid_gain: Positive = _like("Avoidance", "gain", "[1/s] lambda of avoidance")
+    nearest: Count = _like("Avoidance", "nearest", "this many nearest links, one row each")
+    reach_gain: Positive = _like("Reach", "gain", "[1/s] lambda of reaching")
+    max_linear: Positive = _like("Reach", "max_linear", "[m/s] of reaching")
+    max_angular: Positive = _like("Reach", "max_angular", "[rad/s] of reaching")
+    tasks: tuple[TaskName, ...] = Field(
+        ("avoidance", "reach"), min_length=1, description="their order is their priority"
+    )
+    min_row_norm: NonNegative = _like(
+        "ControllerConfig", "min_row_norm", "a link that joints move less than this is passed over"
+    )
+    avoid_links: tuple[str, ...] = _like(
+        "ControllerConfig", "avoid_links", "links to keep away; empty: all that some joint moves"
+    )
+    method: Literal["fast", "paper"] = _like(
+        "ControllerConfig", "method", "accelerated or literal, with the same answer"
+    )
+    filter: Filter = Field(default_factory=Filter)
+    solver: Solver = Field(default_factory=Solver)
+    monitor: Monitor = Field(default_factory=Monitor)
+    joint_limits: JointLimits = Field(default_factory=JointLimits)
+    minimum_altitude: MinimumAltitude = Field(default_factory=MinimumAltitude)
+    manipulability: Manipulability = Field(default_factory=Manipulability)
+
+    @model_validator(mode="after")
+    def _each_task_once(self) -> Self:
+        if len(set(self.tasks)) < len(self.tasks):
+            raise ValueError("tasks names one of them twice")
+        return self
+
+
+class Simulation(Section):
+    """Rates, and what the simulated sensors really do."""
+
+    control_hz: Positive = Field(100.0, description="ticks a second")
+    sensor_hz: Positive = Field(15.0, description="scans of each sensor a second")
+    stagger: bool = Field(False, description="sensors take turns instead of measuring at once")
+    sub_rays: Literal[1, 4, 9, 16] = Field(
+        1, description="rays cast in each zone, of which the nearest counts"
+    )
+    sigma_floor: NonNegative = _like("SensorModel", "sigma_floor", "[m] least noise of a range")
+    sigma_ratio: NonNegative = _like(
+        "SensorModel", "sigma_ratio", "noise as a share of the range, where that is more"
+    )
+    bias: float = Field(0.0, description="[m] added to every range")
+    dropout: Share = Field(0.02, description="share of zones that lose their target in a scan")
+    uncertain: Share = Field(0.0, description="share of targets that come with status 6 or 9")
+    resolution: NonNegative = Field(0.001, description="[m] ranges are rounded to it; 0: not")
+    mounting: NonNegative = Field(
+        0.005, description="[m] of each ray that lies inside the sensor's own mounting"
+    )
+
+
+class Obstacle(Section):
+    """A box that stands still."""
+
+    name: str = Field("panel", description="for messages and pictures")
+    size: Size = Field(description="[m] full edge lengths")
+    position: Vector = Field(description="[m] of its centre, in the base frame")
+    rpy: Vector = Field((0.0, 0.0, 0.0), description="[rad] roll, pitch, yaw")
+
+    def pose(self) -> NDArray[np.float64]:
+        """(4, 4) T_WO of its centre."""
+        return boxes.pose(self.position, self.rpy)
+
+
+class Fault(Section):
+    """Something that goes wrong between the sensors and the controller."""
+
+    sensor: int | str = Field("all", description='row of the skin, name of a sensor, or "all"')
+    kind: FaultKind = Field(description="what goes wrong")
+    start: NonNegative = Field(0.0, alias="from", description="[s] first scan stamp concerned")
+    end: Positive | None = Field(
+        None, alias="to", description="[s] stamps from here on are fine again; left out: never"
+    )
+    value: float | None = Field(None, description="dropout: share; offset: [m]; delay: [s]")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if self.end is not None and self.end <= self.start:
+            raise ValueError(f"to = {self.end:g} must be later than from = {self.start:g}")
+        if self.value is not None and self.kind not in FAULT_VALUES:
+            raise ValueError(f"kind {self.kind} takes no value; {', '.join(FAULT_VALUES)} do")
+        if self.kind == "dropout" and not 0.0 <= (self.value or 0.0) <= 1.0:
+            raise ValueError("value must be a share between 0 and 1")
+        if self.kind == "delay" and (self.value or 0.0) < 0.0:
+            raise ValueError("value must be a time of at least 0 s")
+        return self
+
+
+class Limits(Section):
+    """Limits of a user's own robot, where its description has none; one number is for all."""
+
+    speed: Positive | tuple[Positive, ...] | None = Field(None, description="[rad/s] or [m/s]")
+    acceleration: Positive | tuple[Positive, ...] | None = Field(
+        None, description="[rad/s^2] or [m/s^2]"
+    )

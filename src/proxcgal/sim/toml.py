@@ -1,0 +1,102 @@
+"""TOML in and out: dotted overrides, and a writer for what the standard library only reads."""
+
+from __future__ import annotations
+
+import json
+import math
+import tomllib
+from collections.abc import Mapping
+from typing import Any
+
+from proxcgal.errors import ConfigError
+
+Table = dict[str, Any]
+
+
+def parse(text: str, origin: str) -> Table:
+    """The tables of a TOML text.
+
+    Raises:
+        ConfigError: it is not TOML; the message names `origin` and the line.
+    """
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"{origin}: not TOML: {error}") from None
+
+
+def override(table: Table, assignment: str) -> None:
+    """Sets one key of nested tables from `key.sub=value`, in place.
+
+    The value has TOML syntax; what is not a TOML value is taken as a string, so that
+    `robot=panda` needs no quotes. A number steps into an array: `obstacle.0.size=[1, 1, 1]`.
+
+    Raises:
+        ConfigError: no `=`, an empty key, or a step into what is no table or array.
+    """
+    key, equals, text = assignment.partition("=")
+    steps = [step.strip() for step in key.split(".")]
+    if not equals or not all(steps):
+        raise ConfigError(f"override {assignment!r}: must have the form key.sub=value")
+    try:
+        value = tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        value = text.strip()
+    place: Any = table
+    for depth, step in enumerate(steps):
+        last = depth == len(steps) - 1
+        if isinstance(place, list):
+            if not (step.isdigit() and int(step) < len(place)):
+                raise ConfigError(
+                    f"override {assignment!r}: {'.'.join(steps[:depth])} has the entries "
+                    f"0 to {len(place) - 1}, not {step}"
+                )
+            if last:
+                place[int(step)] = value
+            else:
+                place = place[int(step)]
+        elif isinstance(place, dict):
+            if last:
+                place[step] = value
+            else:
+                place = place.setdefault(step, {})
+        else:
+            raise ConfigError(f"override {assignment!r}: {'.'.join(steps[:depth])} is no table")
+
+
+def format_value(value: object) -> str:
+    """One TOML value, numbers at full precision."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        if math.isnan(value):
+            return "nan"
+        return repr(value) if math.isfinite(value) else ("inf" if value > 0 else "-inf")
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(format_value(item) for item in value) + "]"
+    if isinstance(value, Mapping):
+        pairs = ", ".join(f"{key} = {format_value(item)}" for key, item in value.items())
+        return "{" + pairs + "}"
+    return str(value)
+
+
+def _is_tables(value: object) -> bool:
+    return isinstance(value, list | tuple) and bool(value) and isinstance(value[0], Mapping)
+
+
+def write(table: Mapping[str, Any], path: str = "") -> str:
+    """TOML text of nested tables; keys that are None are left out."""
+    plain, nested = [], []
+    for key, value in table.items():
+        if value is None:
+            continue
+        name = f"{path}.{key}" if path else key
+        if isinstance(value, Mapping):
+            nested.append(f"\n[{name}]\n" + write(value, name))
+        elif _is_tables(value):
+            nested.extend(f"\n[[{name}]]\n" + write(item, name) for item in value)
+        else:
+            plain.append(f"{key} = {format_value(value)}\n")
+    return "".join(plain) + "".join(nested)

@@ -1,0 +1,277 @@
+"""Scenario files: what is valid, and how everything that is not gets told."""
+
+import math
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import BaseModel
+
+from proxcgal import _core
+from proxcgal.errors import ConfigError
+from proxcgal.sim import boxes, toml
+from proxcgal.sim.scenario import Scenario, list_scenarios, load_scenario, parse_scenario
+from proxcgal.sim.scenario_problems import models_in
+
+DOCS = Path(__file__).parents[1] / "docs" / "scenarios.md"
+
+MINIMAL = """
+kind = "static"
+robot = "ur10e"
+q0 = [0, 0, 0, 0, 0, 0]
+duration = 1
+[goal]
+offset = [0.1, 0, 0]
+[[skin.rings]]
+link = "forearm_link"
+at = [0.5]
+sensors = 10
+"""
+
+
+def told(text: str, *overrides: str) -> list[str]:
+    with pytest.raises(ConfigError) as error:
+        parse_scenario('name = "x"\n' + text, "x.toml", overrides)
+    return str(error.value).splitlines()
+
+
+def test_every_built_in_scenario_loads_and_is_described() -> None:
+    listed = list_scenarios()
+    assert {"front_plane", "side_plane"} <= set(listed)
+    for name, line in listed.items():
+        assert load_scenario(name).name == name
+        assert line
+
+
+def test_front_panel_stands_where_the_experiment_puts_it() -> None:
+    front = load_scenario("front_plane")
+    assert front.q0 == (0.0, -1.9, 2.8, -2.47, -1.57, 0.0)
+    assert front.duration == 12.0
+    assert front.goal.offset == (0.75, 0.0, 0.0)
+    (panel,) = front.obstacles
+    assert panel.size == (0.02, 1.0, 1.0)
+    assert panel.position[2] == 0.6
+
+
+def test_side_panel_stands_where_the_experiment_puts_it() -> None:
+    side = load_scenario("side_plane")
+    assert side.q0 == (0.3, -1.7, 1.9, -1.7, -1.57, 0.0)
+    assert side.duration == 20.0
+    assert side.goal.offset == (0.0, -1.10, 0.0)
+    (panel,) = side.obstacles
+    assert panel.size == (1.2, 0.02, 1.0)
+    assert panel.position == (0.5, -0.55, 0.6)
+
+
+@pytest.mark.parametrize("name", ["front_plane", "side_plane"])
+def test_both_planes_have_three_rings_of_ten_round_the_forearm(name: str) -> None:
+    (ring,) = load_scenario(name).skin.rings
+    assert (ring.link, ring.at, ring.sensors) == ("forearm_link", (0.2, 0.5, 0.8), 10)
+
+
+@pytest.mark.parametrize("name", sorted(list_scenarios()))
+def test_resolved_text_gives_the_same_scenario_again(name: str) -> None:
+    scenario = load_scenario(name, ["fault=[{kind='delay', from=1.0, to=2.0, sensor=3}]"])
+    assert parse_scenario(scenario.to_toml(), "again") == scenario
+
+
+def test_resolved_text_has_every_default_written_out() -> None:
+    table = tomllib.loads(parse_scenario('name = "x"' + MINIMAL, "x").to_toml())
+    assert table["controller"]["filter"]["tolerance"] == _core.FilterConfig().tolerance
+    assert table["simulation"]["sensor_hz"] == 15.0
+
+
+@pytest.mark.parametrize(
+    ("key", "struct", "attribute"),
+    [
+        ("d_min", "Avoidance", "d_min"),
+        ("buffer", "Avoidance", "buffer"),
+        ("avoid_gain", "Avoidance", "gain"),
+        ("reach_gain", "Reach", "gain"),
+        ("max_linear", "Reach", "max_linear"),
+        ("max_angular", "Reach", "max_angular"),
+        ("min_row_norm", "ControllerConfig", "min_row_norm"),
+    ],
+)
+def test_control_defaults_are_those_of_the_core(key: str, struct: str, attribute: str) -> None:
+    scenario = load_scenario("front_plane")
+    assert getattr(scenario.controller, key) == getattr(getattr(_core, struct)(), attribute)
+
+
+def test_all_problems_are_told_at_once_one_line_each() -> None:
+    lines = told(
+        """
+        kind = "static"
+        robto = "ur10e"
+        q0 = [1, 2, "x"]
+        duration = -1
+        perception = "seen"
+        [goal]
+        offset = [1, 2]
+        [controller]
+        d_min = "a"
+        dmin = 3
+        tasks = ["avoidance", "fly"]
+        [controller.filter]
+        z_min = nan
+        [[skin.rings]]
+        link = "x"
+        at = [0.2, 2.0]
+        sensors = 1.5
+        [[obstacle]]
+        size = [0, 1, 1]
+        [[fault]]
+        kind = "explode"
+        [[fault]]
+        kind = "silent"
+        from = 3.0
+        to = 1.0
+        """,
+        "seed=-1",
+    )
+    expected = [
+        "x.toml: robot: missing",
+        'x.toml: robto = "ur10e": unknown key; there are name, description, kind, robot',
+        'x.toml: q0.2 = "x": must be a valid number',
+        "x.toml: duration = -1: must be greater than 0",
+        "x.toml: perception = \"seen\": must be 'sensed' or 'known'",
+        "x.toml: goal.offset = [1, 2]: must have at least 3 items, not 2",
+        'x.toml: controller.d_min = "a": must be a valid number',
+        "x.toml: controller.dmin = 3: unknown key; there are d_min, buffer",
+        "x.toml: controller.tasks.1 = \"fly\": must be 'avoidance', 'reach'",
+        "x.toml: controller.filter.z_min: must not be nan",
+        "x.toml: skin.rings.0.at.1 = 2.0: must be less than or equal to 1",
+        "x.toml: skin.rings.0.sensors = 1.5: must be a valid integer",
+        "x.toml: obstacle.0.size.0 = 0: must be greater than 0",
+        "x.toml: obstacle.0.position: missing",
+        "x.toml: fault.0.kind = \"explode\": must be 'silent', 'frozen'",
+        "x.toml: fault.1: to = 1 must be later than from = 3",
+        "x.toml: override seed = -1: must be greater than or equal to 0",
+    ]
+    missing = [start for start in expected if not any(line.startswith(start) for line in lines)]
+    assert missing == []
+    assert len(lines) == len(expected)
+
+
+@pytest.mark.parametrize("text", ["offset = [0, 0, 0]\nposition = [0, 0, 0]", ""])
+def test_goal_needs_exactly_one_of_offset_and_position(text: str) -> None:
+    (line,) = told(MINIMAL.replace("offset = [0.1, 0, 0]", text))
+    assert "exactly one of offset and position" in line
+
+
+def test_unknown_kind_lists_those_that_exist() -> None:
+    (line,) = told(MINIMAL, "kind=hri")
+    assert line == "x.toml: override kind = \"hri\": must be 'static'"
+
+
+def test_unknown_name_lists_the_scenarios() -> None:
+    with pytest.raises(ConfigError, match="one of: front_plane, side_plane"):
+        load_scenario("front_plan")
+
+
+def test_what_is_not_toml_is_told_with_file_and_line(tmp_path: Path) -> None:
+    path = tmp_path / "broken.toml"
+    path.write_text("a = 1\nb = \n")
+    with pytest.raises(ConfigError, match=r"broken\.toml: not TOML: .*line 2"):
+        load_scenario(path)
+
+
+def test_a_file_takes_its_own_name_and_its_paths_are_relative_to_it(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    text = MINIMAL.replace('"ur10e"', '"arm.urdf"\npackage_dirs = ["meshes"]')
+    path.write_text(text)
+    scenario = load_scenario(path)
+    assert scenario.name == "mine"
+    assert scenario.robot == str(tmp_path / "arm.urdf")
+    assert scenario.package_dirs == (str(tmp_path / "meshes"),)
+
+
+def test_overrides_take_toml_values_bare_strings_and_array_places() -> None:
+    scenario = load_scenario(
+        "front_plane",
+        ["controller.d_min=0.3", "robot=panda", "obstacle.0.size=[0.1, 2, 2]", "seed=7"],
+    )
+    assert scenario.controller.d_min == 0.3
+    assert scenario.robot == "panda"
+    assert scenario.obstacles[0].size == (0.1, 2, 2)
+    assert scenario.seed == 7
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("controller.d_min", "must have the form key.sub=value"),
+        ("=3", "must have the form key.sub=value"),
+        ("q0.9=1", "q0 has the entries 0 to 5, not 9"),
+        ("seed.deeper=1", "seed is no table"),
+    ],
+)
+def test_a_bad_override_is_told_as_it_was_given(override: str, message: str) -> None:
+    with pytest.raises(ConfigError, match=message) as error:
+        load_scenario("front_plane", ["seed=1", override])
+    assert override in str(error.value)
+
+
+def test_scenarios_cannot_be_changed_once_loaded() -> None:
+    with pytest.raises(ValueError, match="frozen"):
+        load_scenario("front_plane").controller.d_min = 0.1  # type: ignore[misc]
+
+
+VALUES = st.recursive(
+    st.booleans()
+    | st.integers(-(2**63), 2**63 - 1)
+    | st.floats(allow_nan=False)
+    | st.text(st.characters(exclude_categories=["Cs"])),
+    lambda inner: st.lists(inner, max_size=3),
+    max_leaves=6,
+)
+
+
+@given(st.dictionaries(st.from_regex(r"[a-z_]{1,8}", fullmatch=True), VALUES, max_size=5))
+def test_written_toml_reads_back_exactly(table: dict[str, object]) -> None:
+    assert repr(tomllib.loads(toml.write({"top": table}))["top"]) == repr(table)
+
+
+def test_box_surface_is_closed_and_points_outward() -> None:
+    vertices, triangles = boxes.surface((0.2, 0.4, 0.6), np.eye(4))
+    corners = vertices[triangles]
+    volume = np.einsum("ni,ni->n", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
+    assert math.isclose(volume.sum(), 0.2 * 0.4 * 0.6)
+
+
+def test_box_points_lie_on_its_surface_no_farther_apart_than_asked() -> None:
+    T_WO = boxes.pose((1.0, 2.0, 3.0), (0.3, -0.4, 0.5))
+    size, spacing = (0.02, 0.5, 0.31), 0.05
+    points = boxes.points(size, T_WO, spacing)
+    distances, _, _ = _core.MeshTree(*boxes.surface(size, T_WO)).closest(points)
+    assert distances.max() < 1e-12
+    others = np.linalg.norm(points[:, None] - points[None], axis=2) + 9.0 * np.eye(len(points))
+    assert others.min(axis=1).max() <= spacing + 1e-12
+
+
+def rows_of(model: type[BaseModel], path: str = "") -> list[str]:
+    """The rows of the documentation's tables: key, default, meaning."""
+    rows = []
+    for name, field in model.model_fields.items():
+        key = f"{path}{field.alias or name}"
+        if inner := list(models_in(field.annotation)):
+            rows += rows_of(inner[0], f"{key}.")
+        else:
+            value = field.get_default(call_default_factory=True, validated_data={})
+            default = "required" if field.is_required() else toml.format_value(value)
+            rows.append(f"| `{key}` | {default} | {field.description} |".replace("None", "-"))
+    return rows
+
+
+def test_every_key_is_documented_with_its_default() -> None:
+    text = DOCS.read_text()
+    assert [row for row in rows_of(Scenario) if row not in text] == []
+
+
+def test_the_scenario_in_the_documentation_can_be_copied(tmp_path: Path) -> None:
+    path = tmp_path / "copied.toml"
+    path.write_text(DOCS.read_text().split("```toml\n")[1].split("```")[0])
+    assert load_scenario(path).name == "copied"
