@@ -1,0 +1,212 @@
+"""The durable log of one run: an MCAP file that Foxglove opens and a replay repeats bit for bit.
+
+No chunks, and a flush after every tick: what was acknowledged survives `kill -9`. Every tick holds
+the checksum of the whole file before it, so that damage is found, wherever it is, and told.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+import io
+import json
+import platform
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import TracebackType
+from typing import BinaryIO, Self
+
+import numpy as np
+from mcap.writer import CompressionType, IndexType, Writer
+from numpy.typing import NDArray
+
+from proxcgal.errors import ConfigError
+from proxcgal.sim import foxglove, packing
+from proxcgal.sim.scenario import Scenario
+from proxcgal.sim.ticks import Tick
+
+Array = NDArray[np.float64]
+
+PROFILE = "proxcgal"
+FORMAT = "1"
+TICKS, SETTINGS, KNOWN_POINTS = "/tick", "proxcgal", "known_points_W.npy"
+_TICK_SCHEMA = {
+    "type": "object",
+    "title": "proxcgal.Tick",
+    "description": "Inputs and outputs of one tick; docs/scenarios.md has the fields.",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """What a run was made with."""
+
+    scenario: Scenario
+    controller: str  #: one of CONTROLLERS
+    seed: int
+    meshes: Mapping[str, str]  #: SHA-256 of each link's mesh: the controller's and "full" ones
+    versions: Mapping[str, str] = field(default_factory=lambda: versions())
+    known_points_W: Array | None = field(default=None, compare=False)  #: where the run uses them
+
+
+class Recorder:
+    """Writes one run. A full disk stops the recording, never the run: see `failure`."""
+
+    def __init__(self, path: str | Path) -> None:
+        """Opens the file at once, so that a bad place is told before anything is computed.
+
+        Raises:
+            ConfigError: the folder cannot be made or the file not be written.
+        """
+        self.path = Path(path)
+        self.failure: str | None = None  #: why it stopped early
+        self.started = False
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._stream = _Checked(self.path.open("wb"))
+        except OSError as error:
+            reason = error.strerror or error
+            raise ConfigError(f"recording {self.path}: cannot be written: {reason}") from None
+        self._writer = Writer(
+            self._stream, use_chunking=False, compression=CompressionType.NONE,
+            index_types=IndexType.ALL, enable_data_crcs=True,
+        )  # fmt: skip
+        self._channels: dict[str, int] = {}
+        self._count = 0
+
+    def start(self, settings: Settings) -> None:
+        """Writes what the run is made with."""
+        self.started = True
+        try:
+            self._start(settings)
+        except OSError as error:
+            self._fail(error)
+
+    def write(self, tick: Tick) -> None:
+        """Writes a tick; once this returns without `failure`, the tick can be read back."""
+        if self.failure is None:
+            try:
+                data = packing.encode(tick, self._stream.crc)
+                self._message(TICKS, tick.given.time, data)
+                self._stream.flush()
+            except OSError as error:
+                self._fail(error)
+
+    def show(
+        self,
+        time: float,
+        cloud_W: Array,
+        links: Sequence[str],
+        poses_W: Array,
+        arrow: tuple[Sequence[float] | None, Sequence[float] | None],
+    ) -> None:
+        """Writes what Foxglove draws: the filtered cloud, the links' frames, the closest pair."""
+        if self.failure is None:
+            try:
+                self._message("/cloud", time, foxglove.point_cloud(time, cloud_W))
+                self._message("/links", time, foxglove.frame_transforms(time, links, poses_W))
+                self._message("/scene", time, foxglove.pair_arrow(time, *arrow))
+            except OSError as error:
+                self._fail(error)
+
+    def close(self) -> None:
+        """Writes the index and closes the file; one that nothing was written to is removed."""
+        try:
+            if self.started and self.failure is None:
+                self._writer.finish()
+            self._stream.close()
+        except OSError as error:
+            self._fail(error)
+        if not self.started:
+            self.path.unlink(missing_ok=True)
+
+    def __enter__(self) -> Self:
+        """Closes it at the end."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Closes the file, whatever happened."""
+        self.close()
+
+    def _start(self, settings: Settings) -> None:
+        self._writer.start(PROFILE, f"proxcgal {settings.versions.get('proxcgal', '')}")
+        for topic, schema in {TICKS: _TICK_SCHEMA, **foxglove.TOPICS}.items():
+            number = self._writer.register_schema(
+                str(schema["title"]), "jsonschema", json.dumps(schema).encode()
+            )
+            self._channels[topic] = self._writer.register_channel(topic, "json", number)
+        content = {
+            "format": FORMAT,
+            "scenario": settings.scenario.to_toml(),
+            "controller": settings.controller,
+            "seed": str(settings.seed),
+            "meshes": json.dumps(dict(settings.meshes)),
+            "versions": json.dumps(dict(settings.versions)),
+        }
+        self._writer.add_metadata(SETTINGS, {**content, "crc": settings_crc(content)})
+        if settings.known_points_W is not None:
+            points = io.BytesIO()
+            np.save(points, settings.known_points_W)
+            self._writer.add_attachment(0, 0, KNOWN_POINTS, "application/x-npy", points.getvalue())
+        placed = [(box.name, box.pose(), box.size) for box in settings.scenario.obstacles]
+        self._message("/scene", 0.0, foxglove.boxes(0.0, placed))
+        self._stream.flush()
+
+    def _message(self, topic: str, time: float, data: bytes) -> None:
+        stamp = foxglove.nanoseconds(time)
+        self._writer.add_message(self._channels[topic], stamp, data, stamp, self._count)
+        self._count += 1
+
+    def _fail(self, error: OSError) -> None:
+        self.failure = f"recording {self.path} stopped: {error.strerror}"
+
+
+def settings_crc(content: Mapping[str, str]) -> str:
+    """Checksum of the settings, which stand before any tick."""
+    text = json.dumps({key: content[key] for key in sorted(content)})
+    return str(zlib.crc32(text.encode()))
+
+
+def mesh_hash(vertices: Array, triangles: NDArray[np.integer]) -> str:
+    """SHA-256 of a mesh, the same on every machine."""
+    digest = hashlib.sha256(np.ascontiguousarray(vertices, "<f8").tobytes())
+    digest.update(np.ascontiguousarray(triangles, "<i4").tobytes())
+    return digest.hexdigest()
+
+
+def versions() -> dict[str, str]:
+    """What a result depends on, beside the scenario."""
+    packages = ("proxcgal", "numpy", "mujoco", "pin")
+    found = {name: importlib.metadata.version(name) for name in packages}
+    found |= {"python": platform.python_version(), "machine": platform.machine()}
+    source = importlib.metadata.distribution("proxcgal").read_text("direct_url.json")
+    commit = json.loads(source or "{}").get("vcs_info", {}).get("commit_id")
+    return found | ({"commit": commit} if commit else {})
+
+
+class _Checked:
+    """A file that knows the CRC-32 of all that was written to it."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file = file
+        self.crc = 0
+
+    def write(self, data: bytes) -> int:
+        self.crc = zlib.crc32(data, self.crc)
+        return self._file.write(data)
+
+    def tell(self) -> int:
+        return self._file.tell()
+
+    def flush(self) -> None:
+        self._file.flush()
+
+    def close(self) -> None:
+        self._file.close()
