@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "bvh.hpp"
+#include "triangle.hpp"
 
 // Distance between two surfaces: both trees walked together, nearest boxes first.
 namespace proxcgal::detail {
@@ -18,19 +19,18 @@ struct Witness {
   }
 };
 
-double clamp01(double x) { return std::clamp(x, 0.0, 1.0); }
-
 /// Nearest points of two segments (Ericson, Real-Time Collision Detection, 5.1.9).
 void offer_segments(const Vector3& p, const Vector3& p_end, const Vector3& q, const Vector3& q_end,
                     Witness& out) {
   const Vector3 u = p_end - p, v = q_end - q, r = p - q;
   const double a = u.squaredNorm(), e = v.squaredNorm(), f = v.dot(r), c = u.dot(r), b = u.dot(v);
   const double denominator = a * e - b * b;
-  double s = denominator > 1e-14 * a * e ? clamp01((b * f - c * e) / denominator) : 0.0;
+  double s =
+      denominator > 1e-14 * a * e ? std::clamp((b * f - c * e) / denominator, 0.0, 1.0) : 0.0;
   double t = (b * s + f) / e;
   if (t < 0.0 || t > 1.0) {
-    t = clamp01(t);
-    s = clamp01((b * t - c) / a);
+    t = std::clamp(t, 0.0, 1.0);
+    s = std::clamp((b * t - c) / a, 0.0, 1.0);
   }
   out.offer(p + s * u, q + t * v);
 }
@@ -103,6 +103,14 @@ Box moved(const Box& box, const Pose& T) {
   return {center - half, center + half};
 }
 
+/// Lower bound of the distance from a box to four triangles, by the sphere round the box: tight
+/// where a few large triangles face many small ones, and boxes round the large ones say little.
+double sphere_gap(const Vector3& center, double radius, const TriangleBlock& block) {
+  SurfacePoint nearest;
+  closest_in_block(block, center, nearest);
+  return std::max(0.0, std::sqrt(nearest.squared_distance) - radius);
+}
+
 /// A pair of subtrees; a negative row is a block.
 struct Pending {
   double key;
@@ -116,6 +124,7 @@ double Bvh::squared_distance(const Bvh& other, const Pose& T_LO, double squared_
                              Vector3* on_this, Vector3* on_other) const {
   Witness best;
   best.squared = squared_bound;
+  const Pose T_OL = T_LO.inverse();
   const auto everything = [](const Bvh& bvh) {
     Box box{Vector3::Constant(kInfinity), Vector3::Constant(-kInfinity)};
     for (int lane = 0; lane < kWide; ++lane) {
@@ -129,7 +138,18 @@ double Bvh::squared_distance(const Bvh& other, const Pose& T_LO, double squared_
   std::vector<Pending> heap;
   const auto later = [](const Pending& x, const Pending& y) { return x.key > y.key; };
   const auto push = [&](std::int32_t here, std::int32_t there, const Box& a, const Box& b) {
-    const double key = gap_squared(a, b);
+    double key = gap_squared(a, b);
+    if (!(key < best.squared)) return;
+    if (there < 0 && here >= 0) {
+      const Vector3 center = T_OL * Vector3(0.5 * (a.low + a.high));
+      const double gap = sphere_gap(center, 0.5 * (a.high - a.low).norm(),
+                                    other.blocks_[static_cast<std::size_t>(~there)]);
+      key = std::max(key, gap * gap);
+    } else if (here < 0 && there >= 0) {
+      const double gap = sphere_gap(0.5 * (b.low + b.high), 0.5 * (b.high - b.low).norm(),
+                                    blocks_[static_cast<std::size_t>(~here)]);
+      key = std::max(key, gap * gap);
+    }
     if (!(key < best.squared)) return;
     heap.push_back({key, here, there, a, b});
     std::push_heap(heap.begin(), heap.end(), later);
@@ -151,6 +171,12 @@ double Bvh::squared_distance(const Bvh& other, const Pose& T_LO, double squared_
       for (int i = 0; i < kWide; ++i) {
         if (i > 0 && a.id[i] == a.id[i - 1]) continue;
         const Triangle t = triangle_of(a, i);
+        const Vector3 center = (t[0] + t[1] + t[2]) / 3.0;
+        const double radius =
+            std::sqrt(std::max({(t[0] - center).squaredNorm(), (t[1] - center).squaredNorm(),
+                                (t[2] - center).squaredNorm()}));
+        const double gap = sphere_gap(T_OL * center, radius, b);
+        if (!(gap * gap < best.squared)) continue;
         for (int j = 0; j < kWide; ++j) {
           if (j > 0 && b.id[j] == b.id[j - 1]) continue;
           offer_triangles(t, moved_b[static_cast<std::size_t>(j)], best);
@@ -173,7 +199,7 @@ double Bvh::squared_distance(const Bvh& other, const Pose& T_LO, double squared_
     }
   }
   if (on_this != nullptr) *on_this = best.here;
-  if (on_other != nullptr) *on_other = T_LO.inverse() * best.there;
+  if (on_other != nullptr) *on_other = T_OL * best.there;
   return best.squared;
 }
 

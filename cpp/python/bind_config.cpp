@@ -1,0 +1,124 @@
+#include <nanobind/stl/variant.h>
+
+#include "convert.hpp"
+#include "named_pair.hpp"
+#include "proxcgal/controller.hpp"
+
+namespace proxcgal::binding {
+namespace {
+
+constexpr std::pair<const char*, ControlPoint> kControlPoints[] = {
+    {"whole_body", ControlPoint::kWholeBody}, {"sensor", ControlPoint::kSensor}};
+constexpr std::pair<const char*, Confirmation> kConfirmations[] = {
+    {"off", Confirmation::kOff}, {"zones", Confirmation::kZones}, {"scans", Confirmation::kScans}};
+
+}  // namespace
+}  // namespace proxcgal::binding
+
+void bind_config(nanobind::module_& m) {
+  using namespace proxcgal;           // NOLINT(google-build-using-namespace)
+  using namespace proxcgal::binding;  // NOLINT(google-build-using-namespace)
+
+  nb::class_<FilterConfig>(
+      m, "FilterConfig",
+      "How the robot's own body is told from obstacles ([WA] Algorithm 1, and what noise adds).")
+      .def(
+          "__init__",
+          [](FilterConfig* self, double tolerance, double sigmas, double min_hit,
+             bool surface_margin, const std::string& confirmation, double z_min) {
+            const FilterConfig config{tolerance,
+                                      sigmas,
+                                      min_hit,
+                                      surface_margin,
+                                      choice(confirmation, "confirmation", kConfirmations),
+                                      z_min};
+            config.validate();
+            new (self) FilterConfig(config);
+          },
+          nb::kw_only(), "tolerance"_a = FilterConfig{}.tolerance,
+          "sigmas"_a = FilterConfig{}.sigmas, "min_hit"_a = FilterConfig{}.min_hit,
+          "surface_margin"_a = FilterConfig{}.surface_margin, "confirmation"_a = "off",
+          "z_min"_a = FilterConfig{}.z_min)
+      .def_ro("tolerance", &FilterConfig::tolerance, "[m] epsilon of Algorithm 1.")
+      .def_ro("sigmas", &FilterConfig::sigmas, "The tolerance is at least this many sigma(range).")
+      .def_ro("min_hit", &FilterConfig::min_hit, "[m] nearer hits are the sensor's own mounting.")
+      .def_ro("surface_margin", &FilterConfig::surface_margin,
+              "Also drop what lies that near to any link's surface.")
+      .def_prop_ro(
+          "confirmation",
+          [](const FilterConfig& c) { return choice_name(c.confirmation, kConfirmations); },
+          "'off', 'zones' or 'scans'.")
+      .def_ro("z_min", &FilterConfig::z_min, "[m] world height below which points are cropped.");
+  nb::class_<MonitorConfig>(m, "MonitorConfig", "Freshness bounds of the monitor.")
+      .def(
+          "__init__",
+          [](MonitorConfig* self, double degraded_after, double hold_after, double degraded_scale,
+             int clean_cycles, int missed_deadlines) {
+            const MonitorConfig config{degraded_after, hold_after, degraded_scale, clean_cycles,
+                                       missed_deadlines};
+            config.validate();
+            new (self) MonitorConfig(config);
+          },
+          nb::kw_only(), "degraded_after"_a = MonitorConfig{}.degraded_after,
+          "hold_after"_a = MonitorConfig{}.hold_after,
+          "degraded_scale"_a = MonitorConfig{}.degraded_scale,
+          "clean_cycles"_a = MonitorConfig{}.clean_cycles,
+          "missed_deadlines"_a = MonitorConfig{}.missed_deadlines)
+      .def_ro("degraded_after", &MonitorConfig::degraded_after,
+              "[s] age at which one silent sensor degrades the mode.")
+      .def_ro("hold_after", &MonitorConfig::hold_after,
+              "[s] age at which the silence of all sensors holds the arm.")
+      .def_ro("degraded_scale", &MonitorConfig::degraded_scale,
+              "[-] of the speed limits while degraded.")
+      .def_ro("clean_cycles", &MonitorConfig::clean_cycles,
+              "Cycles without a cause before HOLD or DEGRADED clears.")
+      .def_ro("missed_deadlines", &MonitorConfig::missed_deadlines, "In a row, before HOLD.");
+  nb::class_<ControllerConfig>(
+      m, "ControllerConfig",
+      "Everything the controller is set up with; `tasks` in order of priority.")
+      .def(
+          "__init__",
+          [](ControllerConfig* self, const std::string& control_point,
+             const std::optional<std::vector<TaskSpec>>& tasks, const FilterConfig& filter,
+             const SolverConfig& solver, const MonitorConfig& monitor, double period,
+             double min_row_norm, std::vector<std::string> avoid_links, const std::string& method,
+             int max_points, bool timings) {
+            const ControllerConfig config{choice(control_point, "control_point", kControlPoints),
+                                          tasks ? *tasks : ControllerConfig{}.tasks,
+                                          filter,
+                                          solver,
+                                          monitor,
+                                          period,
+                                          min_row_norm,
+                                          std::move(avoid_links),
+                                          choice(method, "method", kMethods),
+                                          max_points,
+                                          timings};
+            config.validate();
+            new (self) ControllerConfig(config);
+          },
+          "control_point"_a = "whole_body", "tasks"_a = nb::none(), nb::kw_only(),
+          "filter"_a = FilterConfig{}, "solver"_a = SolverConfig{}, "monitor"_a = MonitorConfig{},
+          "period"_a = ControllerConfig{}.period,
+          "min_row_norm"_a = ControllerConfig{}.min_row_norm,
+          "avoid_links"_a = std::vector<std::string>{}, "method"_a = "fast",
+          "max_points"_a = ControllerConfig{}.max_points, "timings"_a = false)
+      .def_prop_ro(
+          "control_point",
+          [](const ControllerConfig& c) { return choice_name(c.control_point, kControlPoints); },
+          "'whole_body', or 'sensor' (SM).")
+      .def_ro("tasks", &ControllerConfig::tasks)
+      .def_ro("filter", &ControllerConfig::filter)
+      .def_ro("solver", &ControllerConfig::solver)
+      .def_ro("monitor", &ControllerConfig::monitor)
+      .def_ro("period", &ControllerConfig::period, "[s] nominal time from tick to tick.")
+      .def_ro("min_row_norm", &ControllerConfig::min_row_norm,
+              "A link whose row n'J is smaller is passed over.")
+      .def_ro("avoid_links", &ControllerConfig::avoid_links,
+              "Links that avoidance looks at; empty for all that some joint moves.")
+      .def_prop_ro("method",
+                   [](const ControllerConfig& c) { return choice_name(c.method, kMethods); })
+      .def_ro("max_points", &ControllerConfig::max_points,
+              "The most known points that a tick takes.")
+      .def_ro("timings", &ControllerConfig::timings);
+}

@@ -1,0 +1,257 @@
+#include <nanobind/stl/tuple.h>
+
+#include <memory>
+
+#include "named_pair.hpp"
+#include "proxcgal/pipeline/distance.hpp"
+#include "proxcgal/pipeline/filter.hpp"
+#include "proxcgal/pipeline/sense.hpp"
+#include "robot_arguments.hpp"
+
+namespace proxcgal::binding {
+namespace {
+
+constexpr std::pair<const char*, RangeModel> kRangeModels[] = {{"tangent", RangeModel::kTangent},
+                                                               {"printed", RangeModel::kPrinted}};
+
+void require_rows(const Eigen::Map<const Points>& points, const char* name) {
+  if (points.rows() == 0)
+    throw GeometryError(std::string(name) + " is empty: at least one point is needed");
+}
+
+nb::object remove_body_all(const Robot& robot, nb::handle q, nb::handle origins, nb::handle points,
+                           nb::handle tolerance, double min_hit, const std::string& method) {
+  const PointsArgument origins_W(origins, "origins_W"), points_W(points, "points_W");
+  const Eigen::Index n = points_W().rows();
+  if (origins_W().rows() != n) {
+    throw GeometryError("origins_W has " + std::to_string(origins_W().rows()) +
+                        " rows and points_W " + std::to_string(n) +
+                        ": one origin for each point is needed");
+  }
+  double same = 0.0;
+  const Eigen::VectorXd per_point = nb::try_cast(tolerance, same)
+                                        ? Eigen::VectorXd::Constant(n, same)
+                                        : vector_from(tolerance, "tolerance", n, Take::kConvert);
+  if (!((per_point.array() >= 0.0).all())) throw ConfigError("tolerance must be 0 m or more");
+  if (!(min_hit >= 0.0))
+    throw ConfigError("min_hit is " + std::to_string(min_hit) + ", allowed is 0 m or more");
+  const Method how = choice(method, "method", kMethods);
+  const Posture posture = posture_at(robot, q);
+  auto* keep = new bool[static_cast<std::size_t>(n)];
+  const nb::capsule owner(keep, [](void* p) noexcept { delete[] static_cast<bool*>(p); });
+  {
+    const nb::gil_scoped_release release;
+    const std::span<const double> tolerances(per_point.data(), static_cast<std::size_t>(n));
+    remove_body(robot, posture, origins_W(), points_W(), tolerances, min_hit, how,
+                {keep, static_cast<std::size_t>(n)});
+  }
+  return nb::cast(nb::ndarray<nb::numpy, bool>(keep, {static_cast<std::size_t>(n)}, owner));
+}
+
+NamedPair closest_pair_all(const Robot& robot, nb::handle q, nb::handle points,
+                           const std::string& method) {
+  const PointsArgument points_W(points, "points_W");
+  require_rows(points_W(), "points_W");
+  const Method how = choice(method, "method", kMethods);
+  const Posture posture = posture_at(robot, q);
+  const nb::gil_scoped_release release;
+  return named(robot, closest_pair(robot, posture, points_W(), how));
+}
+
+std::vector<NamedPair> closest_pairs_all(const Robot& robot, nb::handle q, nb::handle points) {
+  const PointsArgument points_W(points, "points_W");
+  require_rows(points_W(), "points_W");
+  const Posture posture = posture_at(robot, q);
+  std::vector<ClosestPair> pairs(static_cast<std::size_t>(robot.n_links()));
+  {
+    const nb::gil_scoped_release release;
+    closest_pairs(robot, posture, points_W(), {}, pairs);
+  }
+  std::vector<NamedPair> out;
+  for (const ClosestPair& pair : pairs) out.push_back(named(robot, pair));
+  return out;
+}
+
+/// Robot links against a surface that is not the robot's: the exact distance of meshes.
+NamedPair mesh_distance(const Robot& robot, nb::handle q, const MeshTree& tree, nb::handle T_WO,
+                        const std::optional<std::vector<std::string>>& links, double bound) {
+  const Posture posture = posture_at(robot, q);
+  const Pose pose = T_WO.is_none() ? Pose::Identity() : pose_from(T_WO, "T_WO");
+  std::vector<int> rows;
+  if (links) {
+    for (const std::string& name : *links) rows.push_back(robot.link_row(name));
+  } else {
+    for (int link = 0; link < robot.n_links(); ++link) rows.push_back(link);
+  }
+  ClosestPair best;
+  best.distance = bound;
+  const nb::gil_scoped_release release;
+  for (const int link : rows) {
+    const Pose& T_WL = posture.T_WL[static_cast<std::size_t>(link)];
+    Vector3 here, there;
+    const double d =
+        robot.tree(link).distance(tree, T_WL.inverse() * pose, best.distance, &here, &there);
+    if (!(d < best.distance)) continue;
+    best.distance = d;
+    best.link = link;
+    best.surface_W = T_WL * here;
+    best.obstacle_W = pose * there;
+  }
+  if (best.link < 0) best.distance = kInfinity;
+  return named(robot, best);
+}
+
+Eigen::VectorXd self_distances(const Robot& robot, nb::handle q,
+                               const std::vector<std::pair<int, int>>& pairs, double bound) {
+  const Posture posture = posture_at(robot, q);
+  for (const auto& [a, b] : pairs) {
+    if (std::min(a, b) < 0 || std::max(a, b) >= robot.n_links()) {
+      throw GeometryError("pairs names link rows " + std::to_string(a) + " and " +
+                          std::to_string(b) + ": allowed are 0 to " +
+                          std::to_string(robot.n_links() - 1));
+    }
+  }
+  Eigen::VectorXd out(static_cast<Eigen::Index>(pairs.size()));
+  const nb::gil_scoped_release release;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const auto [a, b] = pairs[i];
+    const Pose T_ab = posture.T_WL[static_cast<std::size_t>(a)].inverse() *
+                      posture.T_WL[static_cast<std::size_t>(b)];
+    out[static_cast<Eigen::Index>(i)] = robot.tree(a).distance(robot.tree(b), T_ab, bound);
+  }
+  return out;
+}
+
+Points zone_directions(const SensorModel& model) {
+  const Sense sense(model);
+  Points directions(kZones, 3);
+  for (int zone = 0; zone < kZones; ++zone)
+    directions.row(zone) = sense.point(zone, 1.0).transpose();
+  return directions;
+}
+
+Skin joined(const Skin& a, const Skin& b) {
+  if (!(a.model == b.model))
+    throw ConfigError(
+        "skins with different sensor models cannot be joined: give both the same model");
+  Skin skin = a;
+  skin.mounts.insert(skin.mounts.end(), b.mounts.begin(), b.mounts.end());
+  return skin;
+}
+
+void bind_skin(nb::module_& m) {
+  nb::class_<SensorModel>(
+      m, "SensorModel",
+      "Model of one VL53L8CX-like sensor: 8 x 8 zones, distance along its z axis. SI units.")
+      .def(
+          "__init__",
+          [](SensorModel* self, double field_of_view, double min_range, double max_range,
+             double workspace, double sigma_floor, double sigma_ratio,
+             const std::string& range_model) {
+            const SensorModel model{field_of_view,
+                                    min_range,
+                                    max_range,
+                                    workspace,
+                                    sigma_floor,
+                                    sigma_ratio,
+                                    choice(range_model, "range_model", kRangeModels)};
+            model.validate();
+            new (self) SensorModel(model);
+          },
+          nb::kw_only(), "field_of_view"_a = SensorModel{}.field_of_view,
+          "min_range"_a = SensorModel{}.min_range, "max_range"_a = SensorModel{}.max_range,
+          "workspace"_a = SensorModel{}.workspace, "sigma_floor"_a = SensorModel{}.sigma_floor,
+          "sigma_ratio"_a = SensorModel{}.sigma_ratio, "range_model"_a = "tangent")
+      .def_ro("field_of_view", &SensorModel::field_of_view, "[rad] along one side.")
+      .def_ro("min_range", &SensorModel::min_range, "[m].")
+      .def_ro("max_range", &SensorModel::max_range, "[m].")
+      .def_ro("workspace", &SensorModel::workspace,
+              "[m] along the ray; farther points are cropped.")
+      .def_ro("sigma_floor", &SensorModel::sigma_floor, "[m] least standard deviation of a range.")
+      .def_ro("sigma_ratio", &SensorModel::sigma_ratio, "[-] of the range, where that is more.")
+      .def_prop_ro(
+          "range_model",
+          [](const SensorModel& s) { return choice_name(s.range_model, kRangeModels); },
+          "'tangent', or 'printed' as [WA] eq. (1) has it.")
+      .def("sigma", &SensorModel::sigma, "range"_a, "Standard deviation of a range [m].")
+      .def("__eq__", [](const SensorModel& a, const SensorModel& b) { return a == b; });
+  m.def("zone_directions", &zone_directions, "model"_a,
+        "(64, 3) point of each zone at range 1 m, in the sensor's frame: [WA] eq. (1). Zone = 8 "
+        "row + column.");
+  nb::class_<Mount>(m, "Mount", "Where one sensor sits: its frame in the link's, z looking out.")
+      .def(
+          "__init__",
+          [](Mount* self, std::string name, std::string link, nb::handle T_LS) {
+            new (self) Mount{std::move(name), std::move(link), pose_from(T_LS, "T_LS")};
+          },
+          "name"_a, "link"_a, "T_LS"_a)
+      .def_ro("name", &Mount::name)
+      .def_ro("link", &Mount::link)
+      .def_prop_ro(
+          "T_LS", [](const Mount& mount) { return to_matrix(mount.T_LS); }, "(4, 4).");
+  nb::class_<Skin>(
+      m, "Skin", "The sensors of a robot, row by row, and the model they share. Skins join with +.")
+      .def(
+          "__init__",
+          [](Skin* self, std::vector<Mount> mounts, const SensorModel& model) {
+            new (self) Skin{std::move(mounts), model};
+          },
+          "mounts"_a, "model"_a = SensorModel{})
+      .def_prop_ro("mounts", [](const Skin& skin) { return skin.mounts; })
+      .def_prop_ro("model", [](const Skin& skin) { return skin.model; })
+      .def("__len__", [](const Skin& skin) { return skin.mounts.size(); })
+      .def("__add__", &joined, "other"_a);
+}
+
+}  // namespace
+}  // namespace proxcgal::binding
+
+void bind_pipeline(nanobind::module_& m) {
+  using namespace proxcgal;           // NOLINT(google-build-using-namespace)
+  using namespace proxcgal::binding;  // NOLINT(google-build-using-namespace)
+  bind_skin(m);
+  nb::class_<NamedPair>(m, "ClosestPair",
+                        "The nearest obstacle point and the robot surface point nearest to it.")
+      .def_prop_ro(
+          "distance", [](const NamedPair& p) { return p.pair.distance; }, "[m], unsigned.")
+      .def_ro("link", &NamedPair::link, "Name of the link; empty where there is no pair.")
+      .def_prop_ro(
+          "surface_W", [](const NamedPair& p) { return p.pair.surface_W; },
+          "(3,) on the robot [m].")
+      .def_prop_ro(
+          "obstacle_W", [](const NamedPair& p) { return p.pair.obstacle_W; }, "(3,) [m].")
+      .def_prop_ro(
+          "point", [](const NamedPair& p) { return p.pair.point; },
+          "Row of the cloud, -1 where there was none.")
+      .def("__repr__", [](const NamedPair& p) {
+        return "ClosestPair(distance=" + std::to_string(p.pair.distance) + ", link='" + p.link +
+               "')";
+      });
+  m.def(
+      "remove_body", &remove_body_all, "robot"_a, "q"_a, "origins_W"_a, "points_W"_a,
+      "tolerance"_a = 0.02, "min_hit"_a = 0.005, "method"_a = "fast",
+      nb::sig("def remove_body(robot: Robot, q: object, origins_W: object, points_W: object, "
+              "tolerance: object = 0.02, "
+              "min_hit: float = 0.005, method: str = 'fast') -> numpy.typing.NDArray[numpy.bool_]"),
+      "Algorithm 1 of [WA] alone, over all links: (n,) bool, True where a point is kept.\n\n"
+      "A point is dropped when any link's first hit along its ray lies within the tolerance of "
+      "it.\n\n"
+      "Args:\n    origins_W: (n, 3) emitters [m].\n    points_W: (n, 3) measured points [m].\n    "
+      "tolerance: epsilon [m], one or (n,).\n"
+      "    min_hit: nearer hits are the emitter's own mounting [m].\n    method: 'fast', or "
+      "'paper' for the literal algorithm.\n\n"
+      "Raises:\n    GeometryError: wrong shape, or not finite.");
+  m.def("closest_pair", &closest_pair_all, "robot"_a, "q"_a, "points_W"_a, "method"_a = "fast",
+        "Algorithm 2 of [WA], over all links: the nearest (cloud point, surface point).\n\n"
+        "Raises:\n    GeometryError: empty cloud, wrong shape, or not finite.");
+  m.def("closest_pairs", &closest_pairs_all, "robot"_a, "q"_a, "points_W"_a,
+        "The nearest pair of each link, in the order of link_names.");
+  m.def("mesh_distance", &mesh_distance, "robot"_a, "q"_a, "tree"_a, "T_WO"_a = nb::none(),
+        "links"_a = nb::none(), "bound"_a = kInfinity,
+        "Exact distance from the robot's meshes to another surface whose frame has pose T_WO in "
+        "world. 0 where they cross;\n"
+        "distance inf and link '' where nothing is nearer than `bound`. `point` is -1.");
+  m.def("self_distances", &self_distances, "robot"_a, "q"_a, "pairs"_a, "bound"_a = kInfinity,
+        "Exact distance [m] between the meshes of each pair of link rows; inf where it is not "
+        "below `bound`.");
+}

@@ -1,0 +1,47 @@
+#include <nanobind/nanobind.h>
+
+#include "proxcgal/error.hpp"
+
+namespace nb = nanobind;
+
+void bind_geometry(nb::module_& m);
+void bind_robot(nb::module_& m);
+void bind_pipeline(nb::module_& m);
+void bind_solve(nb::module_& m);
+void bind_config(nb::module_& m);
+void bind_controller(nb::module_& m);
+
+namespace {
+
+/// The Python class of that name in proxcgal.errors: they are defined there once.
+void raise(const char* name, const char* message) {
+  const nb::object type = nb::module_::import_("proxcgal.errors").attr(name);
+  PyErr_SetString(type.ptr(), message);
+}
+
+void translate(const std::exception_ptr& error, void*) {
+  try {
+    std::rethrow_exception(error);
+  } catch (const proxcgal::ConfigError& e) {
+    raise("ConfigError", e.what());
+  } catch (const proxcgal::ModelError& e) {
+    raise("ModelError", e.what());
+  } catch (const proxcgal::GeometryError& e) {
+    raise("GeometryError", e.what());
+  } catch (const proxcgal::ProxError& e) {
+    raise("ProxError", e.what());
+  }
+}
+
+}  // namespace
+
+NB_MODULE(_core, m) {
+  m.doc() = "The control loop of proxcgal: geometry, robot, pipeline, solver, tick.";
+  nb::register_exception_translator(translate);
+  bind_geometry(m);
+  bind_robot(m);
+  bind_pipeline(m);
+  bind_solve(m);
+  bind_config(m);
+  bind_controller(m);
+}

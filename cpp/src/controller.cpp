@@ -1,0 +1,375 @@
+#include "proxcgal/controller.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "perception.hpp"
+#include "proxcgal/error.hpp"
+#include "stopwatch.hpp"
+
+namespace proxcgal {
+namespace {
+
+constexpr double kLongestStep = 0.5;  // [s] a longer one between two ticks is a clock that jumped
+constexpr double kExecuted = 0.5;     // share of the demanded rate that counts as executed
+constexpr double kEngaged = 0.5;      // activation from which avoidance must be executed
+constexpr double kRigid = 1e-6;       // how far a goal's rotation may be from orthonormal
+
+bool is_rigid(const Pose& T) {
+  return T.matrix().allFinite() &&
+         (T.linear() * T.linear().transpose() - Eigen::Matrix3d::Identity()).norm() < kRigid &&
+         T.linear().determinant() > 0.0;
+}
+
+}  // namespace
+
+void FilterConfig::validate() const {
+  const auto require = [](bool ok, const char* field, double value, const char* allowed) {
+    if (!ok) {
+      throw ConfigError(std::string("filter: ") + field + " is " + std::to_string(value) +
+                        ", allowed is " + allowed);
+    }
+  };
+  require(std::isfinite(tolerance) && tolerance >= 0.0, "tolerance", tolerance, "0 m or more");
+  require(std::isfinite(sigmas) && sigmas >= 0.0, "sigmas", sigmas, "0 or more");
+  require(std::isfinite(min_hit) && min_hit >= 0.0, "min_hit", min_hit, "0 m or more");
+  require(!std::isnan(z_min) && z_min < kInfinity, "z_min", z_min,
+          "a height [m], -inf for no crop");
+}
+
+void ControllerConfig::validate() const {
+  if (tasks.empty()) throw ConfigError("controller: tasks is empty, at least one is needed");
+  if (tasks.size() > kMaxLevels) {
+    throw ConfigError("controller: " + std::to_string(tasks.size()) + " tasks, at most " +
+                      std::to_string(kMaxLevels) + " are supported");
+  }
+  for (const TaskSpec& task : tasks) proxcgal::validate(task);
+  filter.validate();
+  solver.validate();
+  monitor.validate();
+  if (!(period > 0.0 && period <= kLongestStep)) {
+    throw ConfigError("controller: period is " + std::to_string(period) +
+                      ", allowed is above 0 to 0.5 s");
+  }
+  if (!(min_row_norm >= 0.0 && min_row_norm < 1.0)) {
+    throw ConfigError("controller: min_row_norm is " + std::to_string(min_row_norm) +
+                      ", allowed is 0 to 1");
+  }
+  if (max_points < 1)
+    throw ConfigError("controller: max_points is " + std::to_string(max_points) +
+                      ", allowed is 1 or more");
+}
+
+struct Controller::Impl {
+  std::shared_ptr<const Robot> robot;
+  Skin skin;
+  ControllerConfig config;
+  Monitor monitor;
+  detail::Perception perception;
+  Limits limits;
+  std::vector<int> avoid_links;  // rows
+  std::vector<int> sensor_link;  // row of each sensor's link
+  std::vector<bool> sensor_moves;
+
+  // The internal clock advances with the caller's, and goes on through its jumps.
+  bool started = false;
+  double caller_time = 0.0, clock = 0.0;
+
+  JointVector qd_last;
+  Posture posture;
+  std::vector<ClosestPair> per_link;
+  std::vector<int> candidates;
+  std::vector<ControlPair> controls;
+  std::array<BuiltTask, kMaxLevels> built;
+  std::array<Task, kMaxLevels> stack;
+  Solution solution;
+  TickOutput out;
+
+  Impl(std::shared_ptr<const Robot> r, Skin s, ControllerConfig c)
+      : robot(std::move(r)),
+        skin(std::move(s)),
+        config(std::move(c)),
+        monitor(config.monitor),
+        perception(robot, skin, config.filter, config.method),
+        limits{robot->q_min(), robot->q_max(), robot->qd_max(), robot->qdd_max()},
+        posture(robot->make_posture()) {
+    for (const TaskSpec& task : config.tasks) proxcgal::validate(task, *robot);
+    if (!limits.qd_max.allFinite() || !limits.qdd_max.allFinite()) {
+      throw ConfigError("robot '" + robot->spec().name +
+                        "' has a joint without a speed or acceleration limit: give both");
+    }
+    for (int link = 0; link < robot->n_links(); ++link) {
+      if (config.avoid_links.empty() &&
+          robot->spec().links[static_cast<std::size_t>(link)].joint >= 0)
+        avoid_links.push_back(link);
+    }
+    for (const std::string& name : config.avoid_links) avoid_links.push_back(robot->link_row(name));
+    for (const Mount& mount : skin.mounts) {
+      sensor_link.push_back(robot->link_row(mount.link));
+      sensor_moves.push_back(
+          robot->spec().links[static_cast<std::size_t>(sensor_link.back())].joint >= 0);
+    }
+    qd_last = JointVector::Zero(robot->n_q());
+    out.qd = qd_last;
+    per_link.resize(avoid_links.size());
+    candidates.reserve(avoid_links.size());
+    controls.reserve(avoid_links.size());
+    out.n_tasks = static_cast<int>(config.tasks.size());
+    perception.timings = config.timings;
+  }
+
+  void note(Reason reason, int link = -1, int count = 1) {
+    Finding finding;
+    finding.reason = reason;
+    finding.link = link;
+    finding.count = count;
+    monitor.add(finding);
+  }
+
+  void advance(double time) {
+    const double step = time - caller_time;
+    if (!started) {
+      clock = 0.0;
+    } else if (step > 0.0 && step <= kLongestStep) {
+      clock += step;
+    } else {
+      clock += config.period;
+      note(Reason::kTimeInvalid);
+    }
+    started = true;
+    caller_time = std::isfinite(time) ? time : caller_time;
+  }
+
+  /// Joint state and goal are usable; else the reason is noted.
+  bool usable(const JointVector& q, const Pose& goal) {
+    const bool joints = q.size() == robot->n_q() && q.allFinite();
+    if (!joints) note(Reason::kJointStateInvalid);
+    const bool rigid = is_rigid(goal);
+    if (!rigid) note(Reason::kGoalInvalid);
+    return joints && rigid;
+  }
+
+  ControlPair control_of(const ClosestPair& pair, const Vector3& velocity_W) const {
+    return {pair.link, pair.surface_W, pair.obstacle_W, velocity_W, pair.distance, Vector3::Zero()};
+  }
+
+  /// The nearest pair whose link joints can move away; what was passed over is noted.
+  std::optional<ClosestPair> drivable_pair(const PointsRef& cloud_W, double engaged_within) {
+    candidates.assign(avoid_links.begin(), avoid_links.end());
+    while (!candidates.empty()) {
+      const ClosestPair pair = closest_pair(*robot, posture, cloud_W, config.method, candidates);
+      if (!pair.found()) return std::nullopt;
+      if (row_norm(*robot, posture, control_of(pair, Vector3::Zero())) >= config.min_row_norm)
+        return pair;
+      note(Reason::kLinkSkipped, pair.link);
+      candidates.erase(std::find(candidates.begin(), candidates.end(), pair.link));
+      if (candidates.empty() && pair.distance < engaged_within)
+        note(Reason::kNoControllableLink, pair.link);
+    }
+    return std::nullopt;
+  }
+
+  /// SM baseline ([WA] ref. 31): the mounting point nearest to the cloud is what moves.
+  void control_sensor(const PointsRef& cloud_W, const Vector3& velocity_W) {
+    double nearest = kInfinity;
+    ControlPair control;
+    for (std::size_t s = 0; s < sensor_link.size(); ++s) {
+      if (!sensor_moves[s]) continue;
+      const Vector3 mount_W = posture.T_WL[static_cast<std::size_t>(sensor_link[s])] *
+                              skin.mounts[s].T_LS.translation();
+      for (Eigen::Index i = 0; i < cloud_W.rows(); ++i) {
+        const Vector3 point_W = cloud_W.row(i).transpose();
+        const double squared = (point_W - mount_W).squaredNorm();
+        if (!(squared < nearest)) continue;
+        nearest = squared;
+        control = {sensor_link[s], mount_W, point_W, velocity_W, 0.0, Vector3::Zero()};
+      }
+    }
+    if (control.link < 0) return;
+    control.distance = std::sqrt(nearest);
+    controls.push_back(control);
+  }
+
+  /// The k nearest links that joints can move away, one pair each.
+  void control_links(const PointsRef& cloud_W, int nearest, const Vector3& velocity_W) {
+    closest_pairs(*robot, posture, cloud_W, avoid_links, per_link);
+    std::sort(per_link.begin(), per_link.end(),
+              [](const auto& x, const auto& y) { return x.distance < y.distance; });
+    for (const ClosestPair& pair : per_link) {
+      if (static_cast<int>(controls.size()) == nearest || !pair.found()) return;
+      const ControlPair control = control_of(pair, velocity_W);
+      if (row_norm(*robot, posture, control) >= config.min_row_norm) controls.push_back(control);
+    }
+  }
+
+  void build(const Avoidance& spec, const PointsRef& cloud_W, const Vector3& velocity_W,
+             BuiltTask& task) {
+    controls.clear();
+    if (config.control_point == ControlPoint::kSensor) {
+      control_sensor(cloud_W, velocity_W);
+    } else if (spec.nearest > 1) {
+      control_links(cloud_W, spec.nearest, velocity_W);
+    } else if (out.pair) {
+      controls.push_back(control_of(*out.pair, velocity_W));
+    }
+    if (!controls.empty()) out.control = controls.front();
+    build_avoidance(spec, *robot, posture, controls, task);
+  }
+
+  void build_stack(const PointsRef& cloud_W, const Vector3& velocity_W, const Pose& goal) {
+    for (std::size_t level = 0; level < config.tasks.size(); ++level) {
+      BuiltTask& task = built[level];
+      task.smallest_row_norm = kInfinity;
+      std::visit(
+          [&](const auto& spec) {
+            using Spec = std::decay_t<decltype(spec)>;
+            if constexpr (std::is_same_v<Spec, Avoidance>) build(spec, cloud_W, velocity_W, task);
+            if constexpr (std::is_same_v<Spec, Reach>)
+              build_reach(spec, *robot, posture, goal, task);
+            if constexpr (std::is_same_v<Spec, JointLimits>)
+              build_joint_limits(spec, *robot, posture, task);
+            if constexpr (std::is_same_v<Spec, MinimumAltitude>)
+              build_minimum_altitude(spec, *robot, posture, task);
+            if constexpr (std::is_same_v<Spec, Manipulability>)
+              build_manipulability(spec, *robot, posture, task);
+          },
+          config.tasks[level]);
+      if (task.smallest_row_norm < kSmallRowNorm) note(Reason::kRowSmall);
+      stack[level] = task.task;
+    }
+  }
+
+  double engaged_within() const {
+    double reach = 0.0;
+    for (const TaskSpec& task : config.tasks) {
+      if (const auto* avoid = std::get_if<Avoidance>(&task))
+        reach = std::max(reach, avoid->d_min + avoid->buffer);
+    }
+    return reach;
+  }
+
+  void report() {
+    for (std::size_t level = 0; level < config.tasks.size(); ++level) {
+      const Task& task = stack[level];
+      TaskReport& told = out.tasks[level];
+      told.name = task_name(config.tasks[level]);
+      told.rate = task.rate;
+      told.activation = task.activation;
+      told.residual = residual(task, out.qd);
+      if (!std::holds_alternative<Avoidance>(config.tasks[level])) continue;
+      for (Eigen::Index row = 0; row < task.rate.size(); ++row) {
+        const bool engaged = task.activation[row] > kEngaged && task.rate[row] > 0.0;
+        if (engaged && told.residual[row] > kExecuted * task.rate[row]) {
+          note(Reason::kNotExecuted, out.control.link);
+          break;
+        }
+      }
+    }
+  }
+
+  /// From the joint state and a cloud to an admissible velocity.
+  void act(const JointVector& q, const PointsRef& cloud_W, const Vector3& velocity_W,
+           const Pose& goal) {
+    detail::Stopwatch watch(config.timings);
+    robot->update(q, posture);
+    out.pair = drivable_pair(cloud_W, engaged_within());
+    out.timings.distance_us = watch.lap_us();
+    build_stack(cloud_W, velocity_W, goal);
+    const std::span<const Task> tasks(stack.data(), config.tasks.size());
+    solve(tasks, robot->n_q(), limits.qd_max, config.solver, solution);
+    const Mode mode = monitor.mode();  // of the last tick: this one's findings are not complete yet
+    const double scale = mode == Mode::kDegraded ? config.monitor.degraded_scale : 1.0;
+    const Admissible box = admissible(limits, q, qd_last, config.period, scale);
+    command({solution.rho.data(), static_cast<std::size_t>(solution.levels) + 1}, tasks, qd_last,
+            box, out.qd);
+    out.timings.solve_us = watch.lap_us();
+    report();
+    if ((q.array() < limits.q_min.array() || q.array() > limits.q_max.array()).any())
+      note(Reason::kOutsideLimits);
+  }
+
+  /// The mode that this tick's findings call for; HOLD and STOP brake instead of what was solved.
+  void conclude(const JointVector& q, bool usable) {
+    out.mode = monitor.conclude();
+    if (!usable || out.mode >= Mode::kHold) {
+      const JointVector& at = usable ? q : posture.q;  // the last posture that could be trusted
+      decelerate(qd_last, admissible(limits, at, qd_last, config.period, 1.0), out.qd);
+    }
+    qd_last = out.qd;
+  }
+
+  void begin(double time, bool late) {
+    monitor.begin();
+    monitor.deadline(late);
+    advance(time);
+    out.pair.reset();
+    out.pair_origin = {};
+    out.control = {};
+    out.timings = {};
+    for (int level = 0; level < out.n_tasks; ++level)
+      out.tasks[static_cast<std::size_t>(level)] = {};
+  }
+};
+
+Controller::Controller(std::shared_ptr<const Robot> robot, Skin skin, ControllerConfig config) {
+  config.validate();
+  impl_ = std::make_unique<Impl>(std::move(robot), std::move(skin), std::move(config));
+}
+Controller::~Controller() = default;
+
+const TickOutput& Controller::tick(double time, const JointVector& q, std::span<const Scan> scans,
+                                   const Pose& goal, bool late) {
+  Impl& me = *impl_;
+  detail::Stopwatch watch(me.config.timings);
+  me.begin(time, late);
+  const bool usable = me.usable(q, goal);
+  if (usable) {
+    me.perception.update(me.clock, me.clock - me.caller_time, q, scans, me.monitor);
+    me.out.timings.sense_us = me.perception.sense_us;
+    me.out.timings.filter_us = me.perception.filter_us;
+    me.perception.check_freshness(me.clock, me.config.monitor, me.monitor);
+    me.act(q, me.perception.cloud_W(), Vector3::Zero(), goal);
+    if (me.out.pair)
+      me.out.pair_origin = me.perception.origins()[static_cast<std::size_t>(me.out.pair->point)];
+  }
+  me.conclude(q, usable);
+  me.out.timings.total_us = watch.lap_us();
+  return me.out;
+}
+
+const TickOutput& Controller::tick_known(double time, const JointVector& q,
+                                         const PointsRef& points_W, const Pose& goal,
+                                         const Vector3& velocity_W) {
+  Impl& me = *impl_;
+  detail::Stopwatch watch(me.config.timings);
+  me.begin(time, false);
+  bool usable = me.usable(q, goal);
+  if (points_W.rows() > me.config.max_points || !points_W.allFinite() || !velocity_W.allFinite()) {
+    me.note(Reason::kPointsInvalid);
+    usable = false;
+  }
+  if (usable) me.act(q, points_W, velocity_W, goal);
+  me.conclude(q, usable);
+  me.out.timings.total_us = watch.lap_us();
+  return me.out;
+}
+
+std::span<const Finding> Controller::findings() const { return impl_->monitor.findings(); }
+Eigen::Map<const Points> Controller::cloud_W() const { return impl_->perception.cloud_W(); }
+std::span<const PointOrigin> Controller::cloud_origins() const {
+  return impl_->perception.origins();
+}
+Eigen::Map<const Points> Controller::raw_cloud_W() const { return impl_->perception.raw_cloud_W(); }
+std::vector<double> Controller::scan_ages(double time) const {
+  std::vector<double> ages(impl_->sensor_link.size());
+  const double now = impl_->clock + (time - impl_->caller_time);
+  for (std::size_t s = 0; s < ages.size(); ++s) ages[s] = impl_->perception.age(s, now);
+  return ages;
+}
+const Robot& Controller::robot() const { return *impl_->robot; }
+const Skin& Controller::skin() const { return impl_->skin; }
+const ControllerConfig& Controller::config() const { return impl_->config; }
+bool Controller::reset() { return impl_->monitor.reset(); }
+
+}  // namespace proxcgal

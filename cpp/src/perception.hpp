@@ -1,0 +1,94 @@
+#pragma once
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "proxcgal/controller.hpp"
+
+namespace proxcgal::detail {
+
+/// Where the joints were in the last moments: a scan is placed where the arm was at its stamp.
+class JointHistory {
+ public:
+  void push(double time, const JointVector& q);
+  /// Linear between neighbours, the end value outside of what is kept.
+  JointVector at(double time) const;
+
+ private:
+  static constexpr std::size_t kKept = 64;
+  std::array<double, kKept> time_{};
+  std::array<JointVector, kKept> q_;
+  std::size_t count_ = 0;  // ever pushed
+  const JointVector& q(std::size_t back) const { return q_[(count_ - 1 - back) % kKept]; }
+  double t(std::size_t back) const { return time_[(count_ - 1 - back) % kKept]; }
+};
+
+/// From scans to the cloud that the arm avoids: sense -> filter, each sensor's last scan kept in
+/// world until its next one.
+class Perception {
+ public:
+  Perception(std::shared_ptr<const Robot> robot, const Skin& skin, const FilterConfig& config,
+             Method method);
+
+  /// @param time   internal clock [s]
+  /// @param delay  internal time minus the caller's: stamps are brought to the internal clock
+  void update(double time, double delay, const JointVector& q, std::span<const Scan> scans,
+              Monitor& monitor);
+  void check_freshness(double time, const MonitorConfig& config, Monitor& monitor) const;
+
+  Eigen::Map<const Points> cloud_W() const { return {cloud_.data(), n_cloud_, 3}; }
+  std::span<const PointOrigin> origins() const {
+    return {origins_.data(), static_cast<std::size_t>(n_cloud_)};
+  }
+  Eigen::Map<const Points> raw_cloud_W() const { return {raw_.data(), n_raw_, 3}; }
+  double age(std::size_t sensor, double time) const;  ///< [s] since receipt
+  int sensors() const { return static_cast<int>(sensors_.size()); }
+  double sense_us = 0, filter_us = 0;  ///< of the last update, where timings are on
+  bool timings = false;
+
+ private:
+  struct Sensor {
+    int link = 0;
+    Pose T_LS = Pose::Identity();
+    bool seen = false;
+    std::uint32_t counter = 0;
+    double received = 0.0;
+    int n_raw = 0, n_kept = 0;
+    std::array<Vector3, kZones> raw_W, kept_W;
+    std::array<std::uint8_t, kZones> zone;
+    // Ranges of the last three scans' surviving points, newest first, for confirmation; infinite
+    // where none survived.
+    std::array<std::array<double, kZones>, 3> past;
+  };
+
+  bool accept(double time, double delay, const Scan& scan, Monitor& monitor);
+  void stage(const Scan& scan, Monitor& monitor);
+  void filter();
+  void keep(Sensor& sensor, int begin, int end);
+  bool confirmed(const Sensor& sensor, const std::array<double, kZones>& ranges, int zone,
+                 double tolerance) const;
+  void gather();
+
+  std::shared_ptr<const Robot> robot_;
+  Sense sense_;
+  FilterConfig config_;
+  Method method_;
+  double mesh_error_ = 0.0;  // of the worst link: added to every tolerance
+  std::vector<Sensor> sensors_;
+  JointHistory history_;
+  Posture posture_;  // where the arm was at the stamp being placed
+
+  // Points of the scans of one stamp, side by side.
+  struct Staged {
+    std::vector<int> sensor, zone;
+    std::vector<double> tolerance, range;
+    Points origins_W, points_W;
+    std::unique_ptr<bool[]> keep;
+    Eigen::Index count = 0;
+  } staged_;
+  Points cloud_, raw_;
+  std::vector<PointOrigin> origins_;
+  Eigen::Index n_cloud_ = 0, n_raw_ = 0;
+};
+
+}  // namespace proxcgal::detail

@@ -1,0 +1,229 @@
+#include <gtest/gtest.h>
+
+#include "allocations.hpp"
+#include "proxcgal/controller.hpp"
+#include "proxcgal/error.hpp"
+#include "robots.hpp"
+
+namespace proxcgal {
+namespace {
+
+using test::Random;
+
+JointVector bent() {
+  JointVector q(6);
+  q << 0.2, 0.6, 0.9, 0.1, 0.5, 0.0;
+  return q;
+}
+
+Pose goal_near(const Robot& robot, const JointVector& q) {
+  Posture posture = robot.make_posture();
+  robot.update(q, posture);
+  Pose goal = posture.T_WT;
+  goal.translation().x() += 0.2;
+  return goal;
+}
+
+/// Scans of a room of changing depth; the noise makes the closest pair jump.
+std::vector<Scan> scans(Random& random, int sensors, std::uint32_t counter, double stamp) {
+  std::vector<Scan> out;
+  for (int s = 0; s < sensors; ++s) {
+    Scan scan;
+    scan.sensor = s;
+    scan.counter = counter;
+    scan.stamp = stamp;
+    scan.status.fill(5);
+    for (double& range : scan.ranges) range = random.uniform(0.15, 1.2);
+    out.push_back(scan);
+  }
+  return out;
+}
+
+ControllerConfig five_tasks() {
+  ControllerConfig config;
+  config.tasks = {JointLimits{}, Avoidance{.nearest = 3}, MinimumAltitude{}, Manipulability{},
+                  Reach{}};
+  config.filter.confirmation = Confirmation::kScans;
+  return config;
+}
+
+TEST(Controller, TickAllocatesNothing) {
+  for (const auto& config : {ControllerConfig{}, five_tasks(),
+                             ControllerConfig{.control_point = ControlPoint::kSensor}}) {
+    const auto robot = test::arm();
+    Controller controller(robot, test::ring(), config);
+    Random random(8);
+    JointVector q = bent();
+    const Pose goal = goal_near(*robot, q);
+    std::vector<std::vector<Scan>> batches;
+    for (std::uint32_t i = 0; i < 300; ++i) batches.push_back(scans(random, 10, i, 0.07 * i));
+    std::size_t found = 0, allocations = 0;
+    for (int i = 0; i < 2000; ++i) {
+      const std::vector<Scan> none;
+      const auto& batch = i % 7 == 0 ? batches[static_cast<std::size_t>(i / 7)] : none;
+      const test::CountAllocations counter;
+      const TickOutput& out = controller.tick(0.01 * i, q, batch, goal);
+      allocations += counter.count();
+      found += out.pair ? 1 : 0;
+      q += 0.01 * out.qd;
+    }
+    EXPECT_EQ(allocations, 0U);
+    EXPECT_GT(found, 1000U);
+  }
+}
+
+TEST(Controller, KnownPointsAllocateNothing) {
+  const auto robot = test::arm();
+  Controller controller(robot, Skin{}, ControllerConfig{});
+  Random random(9);
+  const Points points = test::cloud(random, 3000, 1.5);
+  const JointVector q = bent();
+  const Pose goal = goal_near(*robot, q);
+  const test::CountAllocations counter;
+  for (int i = 0; i < 200; ++i) controller.tick_known(0.01 * i, q, points, goal);
+  EXPECT_EQ(counter.count(), 0U);
+}
+
+TEST(Controller, CommandsStayWithinLimits) {
+  const auto robot = test::arm();
+  Controller controller(robot, test::ring(), five_tasks());
+  Random random(10);
+  JointVector q = bent(), last = JointVector::Zero(6);
+  const Pose goal = goal_near(*robot, q);
+  for (int i = 0; i < 3000; ++i) {
+    const auto batch = i % 7 == 0 ? scans(random, 10, static_cast<std::uint32_t>(i), 0.01 * i)
+                                  : std::vector<Scan>{};
+    const TickOutput& out = controller.tick(0.01 * i, q, batch, goal);
+    ASSERT_TRUE(out.qd.allFinite());
+    EXPECT_TRUE((out.qd.cwiseAbs().array() <= robot->qd_max().array() + 1e-12).all());
+    EXPECT_TRUE(
+        ((out.qd - last).cwiseAbs().array() <= 0.01 * robot->qdd_max().array() + 1e-12).all());
+    last = out.qd;
+    q += 0.01 * out.qd;
+    EXPECT_TRUE((q.array() <= robot->q_max().array() + 1e-9).all() &&
+                (q.array() >= robot->q_min().array() - 1e-9).all());
+  }
+}
+
+TEST(Controller, ANanJointStateStopsWithinOneCycleAndStaysStopped) {
+  const auto robot = test::arm();
+  Controller controller(robot, Skin{}, ControllerConfig{});
+  JointVector q = bent();
+  const Pose goal = goal_near(*robot, q);
+  for (int i = 0; i < 50; ++i) controller.tick(0.01 * i, q, {}, goal);
+  JointVector bad = q;
+  bad[2] = std::nan("");
+  EXPECT_EQ(controller.tick(0.5, bad, {}, goal).mode, Mode::kStop);
+  EXPECT_FALSE(controller.reset());  // the cause is still there
+  EXPECT_EQ(controller.tick(0.51, q, {}, goal).mode, Mode::kStop);
+  EXPECT_TRUE(controller.reset());
+  EXPECT_NE(controller.tick(0.52, q, {}, goal).mode, Mode::kStop);
+}
+
+TEST(Controller, SilenceOfAllSensorsHoldsTheArmWithin200Milliseconds) {
+  const auto robot = test::arm();
+  Controller controller(robot, test::ring(), ControllerConfig{});
+  Random random(11);
+  const JointVector q = bent();
+  const Pose goal = goal_near(*robot, q);
+  for (int i = 0; i < 100; ++i) {
+    const auto batch = i % 7 == 0 ? scans(random, 10, static_cast<std::uint32_t>(i), 0.01 * i)
+                                  : std::vector<Scan>{};
+    controller.tick(0.01 * i, q, batch, goal);
+  }
+  EXPECT_EQ(controller.tick(1.0, q, {}, goal).mode, Mode::kRun);
+  Mode mode = Mode::kRun;
+  for (int i = 1; i <= 20; ++i) mode = controller.tick(0.98 + 0.01 * i, q, {}, goal).mode;
+  EXPECT_EQ(mode, Mode::kHold);
+}
+
+TEST(Controller, ARepeatedOrOlderScanIsRefused) {
+  const auto robot = test::arm();
+  Controller controller(robot, test::ring(), ControllerConfig{});
+  Random random(12);
+  const JointVector q = bent();
+  const Pose goal = goal_near(*robot, q);
+  const auto first = scans(random, 10, 5, 0.0);
+  controller.tick(0.0, q, first, goal);
+  const Points before = controller.cloud_W();
+  controller.tick(0.01, q, scans(random, 10, 5, 0.01), goal);
+  EXPECT_EQ(Points(controller.cloud_W()), before);
+  EXPECT_EQ(controller.findings().front().reason, Reason::kScanRefused);
+  controller.tick(0.02, q, scans(random, 10, 4, 0.02), goal);
+  EXPECT_EQ(Points(controller.cloud_W()), before);
+}
+
+TEST(Controller, TheCloudStaysInWorldBetweenScans) {
+  const auto robot = test::arm();
+  Controller controller(robot, test::ring(), ControllerConfig{});
+  Random random(13);
+  JointVector q = bent();
+  const Pose goal = goal_near(*robot, q);
+  controller.tick(0.0, q, scans(random, 10, 1, 0.0), goal);
+  const Points before = controller.cloud_W();
+  ASSERT_GT(before.rows(), 0);
+  q[0] += 0.3;
+  controller.tick(0.01, q, {}, goal);
+  EXPECT_EQ(Points(controller.cloud_W()), before);
+}
+
+TEST(Controller, AScanIsPlacedWhereTheArmWasAtItsStamp) {
+  const auto robot = test::arm();
+  ControllerConfig config;
+  config.filter.surface_margin = false;
+  config.filter.tolerance = 0.0;
+  config.filter.sigmas = 0.0;
+  Random random(14);
+  const auto batch = scans(random, 10, 1, 0.015);  // halfway between two ticks
+  const auto run = [&](bool moving) {
+    Controller controller(robot, test::ring(), config);
+    JointVector q = bent();
+    const Pose goal = goal_near(*robot, q);
+    for (int i = 0; i < 4; ++i) {
+      if (moving) q[0] = 0.1 * i;
+      if (!moving) q[0] = 0.15;
+      controller.tick(0.01 * i, q, i == 3 ? batch : std::vector<Scan>{}, goal);
+    }
+    return Points(controller.raw_cloud_W());
+  };
+  EXPECT_LT((run(true) - run(false)).cwiseAbs().maxCoeff(), 1e-9);
+}
+
+TEST(Controller, AClockThatJumpsAnHourChangesNoCommand) {
+  const auto run = [](double jump) {
+    const auto robot = test::arm();
+    Controller controller(robot, test::ring(), ControllerConfig{});
+    Random random(15);
+    JointVector q = bent();
+    const Pose goal = goal_near(*robot, q);
+    JointVector sum = JointVector::Zero(6);
+    for (int i = 0; i < 200; ++i) {
+      const double time = 0.01 * i + (i >= 100 ? jump : 0.0);
+      const auto batch =
+          i % 7 == 0 ? scans(random, 10, static_cast<std::uint32_t>(i), time) : std::vector<Scan>{};
+      const TickOutput& out = controller.tick(time, q, batch, goal);
+      q += 0.01 * out.qd;
+      sum += out.qd;
+    }
+    return sum;
+  };
+  EXPECT_LT((run(3600.0) - run(0.0)).norm(), 1e-6);
+  EXPECT_LT((run(-3600.0) - run(0.0)).norm(), 1e-6);
+}
+
+TEST(Controller, RefusesContradictions) {
+  const auto robot = test::arm();
+  EXPECT_THROW(Controller(robot, test::ring(3, "no_such_link"), ControllerConfig{}), ModelError);
+  ControllerConfig config;
+  config.tasks.clear();
+  EXPECT_THROW(Controller(robot, Skin{}, config), ConfigError);
+  config = ControllerConfig{};
+  config.period = 0.0;
+  EXPECT_THROW(Controller(robot, Skin{}, config), ConfigError);
+  config = ControllerConfig{};
+  config.filter.tolerance = std::nan("");
+  EXPECT_THROW(Controller(robot, Skin{}, config), ConfigError);
+}
+
+}  // namespace
+}  // namespace proxcgal

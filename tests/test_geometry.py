@@ -1,0 +1,123 @@
+"""Distances and rays against libigl, on real link meshes."""
+
+import igl
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import proxcgal as px
+
+ROBOTS = ["ur10e", "panda", "kr150"]
+
+
+@pytest.fixture(scope="module", params=ROBOTS)
+def robot(request):
+    return px.load_robot(request.param)
+
+
+def queries(rng, vertices, n):
+    """Points near, on and far from a surface."""
+    center, size = vertices.mean(0), np.ptp(vertices, 0).max()
+    near = vertices[rng.integers(len(vertices), size=n // 2)] + rng.normal(0, 0.02, (n // 2, 3))
+    return np.vstack([near, center + rng.uniform(-2 * size, 2 * size, (n - n // 2, 3))])
+
+
+def test_closest_agrees_with_libigl(robot):
+    rng = np.random.default_rng(0)
+    for link in robot.link_names:
+        vertices, triangles = robot.mesh(link)
+        points = queries(rng, vertices, 600)
+        distance, surface, triangle = robot.tree(link).closest(points)
+        expected, *_ = igl.point_mesh_squared_distance(points, vertices, triangles.astype(np.int64))
+        np.testing.assert_allclose(distance, np.sqrt(expected), rtol=0, atol=1e-9)
+        np.testing.assert_allclose(np.linalg.norm(surface - points, axis=1), distance, atol=1e-9)
+        assert (triangle >= 0).all() and (triangle < len(triangles)).all()
+
+
+def first_hits(vertices, triangles, origins, directions):
+    """Every ray against every triangle (Moeller-Trumbore), in numpy."""
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    hits = np.full(len(origins), np.inf)
+    for i, (o, d) in enumerate(zip(origins, directions, strict=True)):
+        p = np.cross(d, c - a)
+        det = np.einsum("ij,ij->i", b - a, p)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            u = np.einsum("ij,ij->i", o - a, p) / det
+            q = np.cross(o - a, b - a)
+            v = q @ d / det
+            t = np.einsum("ij,ij->i", c - a, q) / det
+        ok = (u >= 0) & (v >= 0) & (u + v <= 1) & (t >= 0)
+        if ok.any():
+            hits[i] = t[ok].min() * np.linalg.norm(d)
+    return hits
+
+
+def test_first_hit_agrees_with_every_triangle_asked(robot):
+    rng = np.random.default_rng(1)
+    for link in robot.link_names:
+        vertices, triangles = robot.mesh(link)
+        origins = queries(rng, vertices, 100)
+        directions = vertices[rng.integers(len(vertices), size=100)] - origins
+        directions += rng.normal(0, 0.01, directions.shape)
+        found = robot.tree(link).first_hit(origins, directions)
+        expected = first_hits(vertices, triangles, origins, directions)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9)
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(0.01, 10.0))
+def test_distance_scales_with_the_scene(seed, scale):
+    rng = np.random.default_rng(seed)
+    vertices, triangles = rng.normal(size=(12, 3)), rng.integers(12, size=(20, 3))
+    distinct = [len(set(t)) == 3 for t in triangles.tolist()]
+    points = rng.normal(size=(10, 3))
+    one = px.MeshTree(vertices, triangles[distinct]).closest(points)[0]
+    scaled = px.MeshTree(vertices * scale, triangles[distinct]).closest(points * scale)[0]
+    np.testing.assert_allclose(scaled, one * scale, rtol=1e-9, atol=1e-12)
+
+
+def cube():
+    from itertools import product
+
+    vertices = np.array(list(product((0.0, 1.0), repeat=3)))
+    triangles = np.array(
+        [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1]]
+        + [[2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]
+    )
+    return vertices, triangles
+
+
+@pytest.mark.parametrize("kind", [np.int32, np.int64, np.uint16])
+def test_triangles_may_have_any_integer_type(kind):
+    vertices, triangles = cube()
+    assert px.MeshTree(vertices, triangles.astype(kind)).closest([[0.5, 0.5, 3.0]])[0] == [2.0]
+
+
+@pytest.mark.parametrize(
+    ("vertices", "triangles", "message"),
+    [
+        (np.zeros((3, 2)), [[0, 1, 2]], r"vertices_L has shape \(3, 2\), expected \(n, 3\)"),
+        (np.full((3, 3), np.nan), [[0, 1, 2]], "vertices_L row 0 is not finite"),
+        (cube()[0], np.zeros((0, 3), int), "no triangle"),
+        (cube()[0], [[0, 1, 8]], "triangle 0 uses vertex 8: allowed are 0 to 7"),
+        (cube()[0], [[0, 1, -1]], "triangle 0 uses vertex -1"),
+        (cube()[0], [[0, 1, 2**40]], "triangle 0 uses vertex"),
+        (cube()[0], [[0.0, 1.0, 2.0]], "expected integers"),
+        (cube()[0], [[0, 1]], r"expected \(f, 3\)"),
+        (cube()[0], [[0, 0, 0]], "no triangle with area"),
+        ("text", [[0, 1, 2]], "vertices_L is"),
+    ],
+)
+def test_a_bad_mesh_is_refused_by_name(vertices, triangles, message):
+    with pytest.raises(px.GeometryError, match=message):
+        px.MeshTree(vertices, triangles)
+
+
+def test_bad_queries_are_refused_by_name():
+    tree = px.MeshTree(*cube())
+    with pytest.raises(px.GeometryError, match="points_L row 1 is not finite"):
+        tree.closest([[0, 0, 0], [np.inf, 0, 0]])
+    with pytest.raises(px.GeometryError, match="directions_L row 0 is zero"):
+        tree.first_hit([[0, 0, 0]], [[0, 0, 0]])
+    with pytest.raises(px.GeometryError, match="one direction for each origin"):
+        tree.first_hit([[0, 0, 0]], [[0, 0, 1], [0, 0, 1]])
