@@ -69,7 +69,7 @@ def _parts(runs: Sequence[Run], about: About) -> Iterator[str]:
     for run in runs:
         yield f"<h2>{escape(run.summary.scenario)}</h2>"
         if run.about.description:
-            yield f"<p>{escape(run.about.description)}.</p>"
+            yield f"<p>{escape(_sentence(run.about.description))}</p>"
         for name, caption in PICTURES:
             part, used = _picture(run.folder / name, caption, budget)
             budget -= used
@@ -142,6 +142,15 @@ def _table(runs: Sequence[Run]) -> Iterator[str]:
 
 def _verdict(runs: Sequence[Run]) -> Iterator[str]:
     for run in runs:
+        gain, ends = run.summary.gain_mm, run.summary.controllers
+        if gain is not None and {"wb", "sm"} <= ends.keys():
+            more = "farther from" if gain >= 0.0 else "nearer to"
+            yield (
+                f"<p>In <b>{escape(run.summary.scenario)}</b> the whole-body law ends "
+                f"{abs(gain):.0f} mm {more} the obstacle than the sensor-point baseline, truly: "
+                f"{shown(ends['wb'].true_final_m)} m against {shown(ends['sm'].true_final_m)} m."
+                "</p>"
+            )
         own = run.summary.self_min_m
         if run.summary.failed:
             yield (
@@ -153,6 +162,11 @@ def _verdict(runs: Sequence[Run]) -> Iterator[str]:
         "keeping the distance comes first. These are engineering figures from a simulation, not "
         "a certificate of any kind.</p>"
     )
+
+
+def _sentence(text: str) -> str:
+    """Text as a sentence: a capital first, a full stop last."""
+    return text[:1].upper() + text[1:].rstrip(". ") + "."
 
 
 def _picture(path: Path, caption: str, budget: int) -> tuple[str, int]:
@@ -210,7 +224,7 @@ def _origin(about: About) -> Iterator[str]:
     for name, value in rows:
         if value:
             yield f'<tr><td class="left">{escape(name)}</td>'
-            yield f'<td class="left">{escape(value)}</td></tr>'
-    yield '<tr><td class="left">[WA]</td><td class="left">S. Borelli et al., Generating '
+            yield f'<td class="wide">{escape(value)}</td></tr>'
+    yield '<tr><td class="left">[WA]</td><td class="wide">S. Borelli et al., Generating '
     yield "Whole-Arm Avoidance Motion Through Localized Proximity Sensing, IEEE/ASME Trans. "
     yield "Mechatronics, 2025, doi:10.1109/TMECH.2025.3582432</td></tr></tbody></table>"

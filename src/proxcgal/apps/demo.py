@@ -1,0 +1,62 @@
+"""`proxcgal demo`: both static scenes with all controllers, and one report of them."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from proxcgal.apps.options import Flag, Number, checked_workers
+
+SCENARIOS = ("front_plane", "side_plane")
+
+
+@dataclass(frozen=True)
+class DemoOptions:
+    """Run the static scenes with all controllers: table, figures, moving pictures, one report.
+
+    Examples:
+      proxcgal demo
+      proxcgal demo --out /tmp/demo --seed 7
+    """
+
+    out: Annotated[Path, tyro.conf.arg(metavar="DIR")] = Path("out/demo")
+    """Where results go; an earlier demo's files there are replaced."""
+    seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
+    """Fixes every random draw."""
+    workers: Number = None
+    """Processes that simulate; left out: one a processor."""
+    quiet: Flag = False
+    """No progress on stderr."""
+
+
+def demo_command(options: DemoOptions, command: str) -> int:
+    """Runs the demo; the report's path is the last line printed."""
+    from proxcgal.apps.origin import origin
+    from proxcgal.apps.report import write_report
+    from proxcgal.apps.results import Plan, check, combine, perform, ready
+    from proxcgal.apps.run import conclude
+    from proxcgal.sim.scenario import CONTROLLERS, load_scenario
+
+    workers = checked_workers(options.workers)
+    scenarios = [load_scenario(name, [f"seed={options.seed}"]) for name in SCENARIOS]
+    for scenario in scenarios:
+        check(scenario, CONTROLLERS)
+    plans = [
+        Plan(scenario=scenario, controllers=CONTROLLERS, folder=options.out / scenario.name)
+        for scenario in scenarios
+    ]
+    ready([options.out])
+    made = origin(command)
+    summaries = perform(plans, made, workers=workers, quiet=options.quiet)
+    combine(options.out, summaries, made)
+    return conclude(summaries, write_report(options.out))
+
+
+if __name__ == "__main__":
+    from proxcgal.apps.cli import call
+
+    sys.exit(call("demo", sys.argv[1:]))

@@ -1,0 +1,82 @@
+"""What a run is shown as: jobs that draw a folder's figures and its moving picture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from proxcgal.errors import SimulationError
+from proxcgal.study.analysis import write_bytes
+
+if TYPE_CHECKING:
+    from proxcgal.sim.scenario import Scenario
+    from proxcgal.sim.trial import TrialLog
+    from proxcgal.study.pool import Report
+
+DRAWN_SPACING_M = 0.03  # [m] between the obstacle's points in a figure
+MOVING = ("wb", "sm")  # whose recordings the moving picture shows, side by side
+
+
+def draw_figures(scenario: Scenario, logs: Sequence[TrialLog], folder: Path, report: Report) -> str:
+    """Draws `distance.png` and, where a posture shows a pair, `pairs.png`; what was drawn."""
+    from proxcgal.study.figures import png, time_figure
+
+    law = scenario.controller
+    title = f"{scenario.name}: {logs[0].robot}, seed {logs[0].seed}"
+    figure = time_figure(logs, title=title, d_min=law.d_min, buffer=law.buffer)
+    write_bytes(folder / "distance.png", png(figure))
+    report(0.5)
+    return f"{scenario.name}: distance.png" + _draw_pairs(scenario, logs, folder)
+
+
+def _draw_pairs(scenario: Scenario, logs: Sequence[TrialLog], folder: Path) -> str:
+    """On the posture of the whole-body run at which it was nearest to what it saw."""
+    from proxcgal.sim.setup import Setup
+    from proxcgal.study.figures import png
+    from proxcgal.study.pairs import pair_figure, sensor_view, whole_body_view
+
+    setup = Setup.of(scenario)
+    points_W = setup.known_points()
+    if not len(points_W):
+        return ""
+    log = next((log for log in logs if log.controller == "wb"), logs[0])
+    tick = int(np.argmin(log.true_m))
+    q, drawn = log.q[tick], setup.known_points(DRAWN_SPACING_M)
+    views = [
+        whole_body_view(setup.robot, q, points_W, drawn_W=drawn, title="whole body (WB)"),
+        sensor_view(
+            setup.robot, setup.skin, q, points_W, drawn_W=drawn, title="sensor points (SM)"
+        ),
+    ]
+    title = (
+        f"{scenario.name}: closest pairs on one posture ({log.controller}, {log.time[tick]:.1f} s)"
+    )
+    write_bytes(folder / "pairs.png", png(pair_figure([views], title=title)))
+    return ", pairs.png"
+
+
+def draw_motion(scenario: Scenario, folder: Path, report: Report) -> str:
+    """Draws `motion.gif` from the folder's recordings; what was drawn, or why nothing was.
+
+    A machine that cannot draw off screen still gets all its numbers and figures.
+    """
+    from proxcgal.sim.recording import read_recording
+    from proxcgal.study.motion import motion_picture
+
+    files = [folder / f"{name}.mcap" for name in MOVING]
+    recordings = [read_recording(path) for path in files if path.is_file()]
+    if not recordings:
+        return f"{scenario.name}: no motion.gif: neither {' nor '.join(MOVING)} was run"
+    path = folder / "motion.gif"
+    half = path.with_name(".motion.gif")
+    try:
+        motion_picture(recordings, half, report)
+        half.replace(path)
+    except SimulationError as error:
+        return f"{scenario.name}: no motion.gif: {error}"
+    finally:
+        half.unlink(missing_ok=True)
+    return f"{scenario.name}: motion.gif"

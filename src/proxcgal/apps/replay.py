@@ -1,0 +1,189 @@
+"""`proxcgal replay`: step through a recording, or recompute it with another setting."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+import tyro
+
+from proxcgal.apps.options import ControllerName, Flag, Settings, flat
+from proxcgal.errors import ConfigError
+
+if TYPE_CHECKING:
+    from proxcgal.sim.recording import Recording
+    from proxcgal.sim.ticks import Tick
+    from proxcgal.sim.trial_log import TrialLog
+
+MODES = ("RUN", "DEGRADED", "HOLD", "STOP")
+
+
+@dataclass(frozen=True)
+class ReplayOptions:
+    """Step through a recording: a line per tick, then what it amounts to.
+
+    With --controller or --set, the commands are computed again from the recorded inputs, and
+    compared with those of the recording; unchanged settings give the same, bit for bit.
+
+    Examples:
+      proxcgal replay out/demo/front_plane/wb.mcap --every 50
+      proxcgal replay out/demo/front_plane/wb.mcap --at 3.2
+      proxcgal replay out/demo/front_plane/wb.mcap --step
+      proxcgal replay out/demo/front_plane/wb.mcap --set controller.d_min=0.3
+    """
+
+    file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
+    """A recording that `proxcgal run` wrote (.mcap)."""
+    at: Annotated[float | None, tyro.conf.arg(metavar="T", help_behavior_hint="")] = None
+    """Show all of the tick at this time [s], instead of a line per tick."""
+    every: Annotated[int, tyro.conf.arg(metavar="N")] = 1
+    """Show every Nth tick only."""
+    step: Flag = False
+    """Wait for Enter after each line; q ends."""
+    controller: Annotated[
+        ControllerName | None,
+        tyro.conf.arg(metavar="wb|sm|wb_known", help_behavior_hint=""),
+    ] = None
+    """Compute the commands of this controller from the recorded inputs."""
+    set: Settings = ()
+    """Compute the commands with other keys of the recorded scenario."""
+
+
+def replay_command(options: ReplayOptions, command: str) -> int:
+    """Prints the ticks asked for and the run's numbers."""
+    from proxcgal.sim.recording import read_recording
+    from proxcgal.sim.replay import Replay, recompute, recorded_log
+
+    if options.every < 1:
+        raise ConfigError(f"--every {options.every}: must be 1 or more")
+    recording = read_recording(options.file)
+    if recording.damage:
+        print(f"proxcgal: {options.file}: damaged: {recording.damage}", file=sys.stderr)
+    if not recording.ticks:
+        raise ConfigError(f"{options.file}: holds no tick")
+    changes = flat(options.set)
+    again = options.controller is not None or bool(changes)
+    if options.at is not None:
+        row = _row_at(recording, options.at)
+        ticks = list(Replay(recording, options.controller, changes)) if again else recording.ticks
+        _print_header(recording)
+        _show_tick(ticks[row])
+        return 0
+    log = recompute(recording, options.controller, changes) if again else recorded_log(recording)
+    _print_header(recording)
+    _walk(_lines(log, options.every), step=options.step)
+    _print_summary(log)
+    if again:
+        _compare(recording, log)
+    return 0
+
+
+def _print_header(recording: Recording) -> None:
+    settings = recording.settings
+    print(
+        f"{settings.scenario.name}, {settings.controller}, seed {settings.seed}: "
+        f"{len(recording.ticks)} ticks, {recording.ticks[-1].given.time:.2f} s"
+    )
+
+
+def _lines(log: TrialLog, every: int) -> Iterator[str]:
+    """A line a tick: distances in m, the link that avoidance moves, findings with their sensor."""
+    width = max(map(len, log.control_link), default=0)
+    yield (
+        f"{'time':>7}  {'seen':>6}  {'true':>6}  {'act':>4}  {'goal':>6}  {'mode':<8}  "
+        f"{'moves':<{width}}"
+    ).rstrip()
+    for row in range(0, len(log.time), every):
+        yield (
+            f"{log.time[row]:7.2f}  {_metres(log.seen_m[row])}  {_metres(log.true_m[row])}  "
+            f"{log.activation[row]:4.2f}  {log.goal_error_m[row]:6.3f}  "
+            f"{MODES[log.mode[row]]:<8}  {log.control_link[row]}"
+        ).rstrip()
+
+
+def _walk(lines: Iterator[str], *, step: bool) -> None:
+    """Prints the lines; with `step`, one for each Enter."""
+    for row, line in enumerate(lines):
+        print(line, end="" if step and row else "\n", flush=True)
+        if step and row:
+            try:
+                answer = input("  ")
+            except EOFError:
+                print()
+                return
+            if answer.strip().lower() in ("q", "quit"):
+                return
+
+
+def _print_summary(log: TrialLog) -> None:
+    from proxcgal.study.analysis import static_summary, table
+
+    print()
+    print(table([static_summary([log])]))
+    found = ", ".join(f"{reason} in {ticks} ticks" for reason, ticks in log.findings.items())
+    print(f"findings: {found or 'none'}")
+
+
+def _compare(recording: Recording, log: TrialLog) -> None:
+    """How far the recomputed commands are from the recorded ones."""
+    recorded = np.array([tick.result.qd for tick in recording.ticks])
+    if np.array_equal(recorded, log.qd):
+        print("commands: the same as recorded, bit for bit")
+        return
+    apart = np.abs(recorded - log.qd).max(axis=1)
+    row = int(apart.argmax())
+    print(
+        f"commands: differ from the recorded ones in {np.count_nonzero(apart)} of {len(apart)} "
+        f"ticks, most by {apart[row]:.4f} rad/s at {log.time[row]:.2f} s; the arm moves as recorded"
+    )
+
+
+def _row_at(recording: Recording, time: float) -> int:
+    """Row of the first tick at or after that time. Raises: ConfigError outside the recording."""
+    last = recording.ticks[-1].given.time
+    if not 0.0 <= time <= last:
+        raise ConfigError(f"--at {time:g}: must be 0 to {last:g} s, which the recording holds")
+    times = [tick.given.time for tick in recording.ticks]
+    return int(np.searchsorted(times, time - 1e-9))
+
+
+def _show_tick(tick: Tick) -> None:
+    """Everything of one tick."""
+    given, result, truth = tick.given, tick.result, tick.truth
+    sensors = ", ".join(str(scan.sensor) for scan in given.scans)
+    rows = [
+        ("time", f"{given.time:.4f} s{', late' if given.late else ''}"),
+        ("q", _vector(given.q)),
+        ("goal", _vector(given.goal[:3, 3])),
+        ("scans", sensors or ("known points" if given.known else "none")),
+        ("cloud", f"{result.cloud_points} points"),
+        ("seen", f"{_metres(result.seen).strip()} {result.link}"),
+        ("true", f"{_metres(truth.distance).strip()} {truth.link}"),
+        ("own links", _metres(truth.own).strip()),
+        ("moves", result.control_link or "nothing"),
+        ("mode", MODES[result.mode]),
+        ("qd", _vector(result.qd)),
+    ]
+    for task in result.tasks:
+        for name in ("rate", "activation", "residual"):
+            rows.append((f"{task.name} {name}", _vector(getattr(task, name))))
+    for found in result.findings:
+        where = f" sensor {found.sensor}" if found.sensor >= 0 else ""
+        where += f" zone {found.zone}" if found.zone >= 0 else ""
+        where += f" {found.link}" if found.link else ""
+        rows.append(("finding", f"{found.reason}{where}, {found.count} times"))
+    width = max(len(name) for name, _ in rows)
+    for name, value in rows:
+        print(f"{name:<{width}}  {value}".rstrip())
+
+
+def _metres(distance: float) -> str:
+    return f"{distance:6.3f}" if np.isfinite(distance) else "  none"
+
+
+def _vector(values: Iterable[float]) -> str:
+    return " ".join(f"{value:.4f}" for value in values) or "none"

@@ -1,0 +1,206 @@
+"""A folder of results: made ready, filled by trials, finished with numbers and pictures."""
+
+from __future__ import annotations
+
+import functools
+import tempfile
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from proxcgal.apps.progress import Progress
+from proxcgal.errors import ConfigError, ModelWarning
+from proxcgal.study.analysis import Summary, combined, static_summary, write_json, write_text
+from proxcgal.study.pool import Pool, Report, default_workers
+
+if TYPE_CHECKING:
+    from proxcgal.sim.scenario import Scenario
+    from proxcgal.sim.trial import TrialLog
+
+#: What a run writes, recordings apart. Older ones are removed before a run begins: an interrupted
+#: run must not leave its recordings beside another run's numbers.
+FILES = (
+    "summary.json",
+    "run.json",
+    "scenario.toml",
+    "report.html",
+    "distance.png",
+    "pairs.png",
+    "motion.gif",
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan:
+    """Trials of one scenario, and where their results go."""
+
+    scenario: Scenario
+    controllers: tuple[str, ...]
+    folder: Path
+
+
+def perform(
+    plans: Sequence[Plan],
+    origin: dict[str, Any],
+    *,
+    workers: int | None = None,
+    pictures: bool = True,
+    quiet: bool = False,
+) -> list[Summary]:
+    """Runs all trials and fills the plans' folders; `check` comes first.
+
+    Args:
+        plans: what to run.
+        origin: how these results are made, for `run.json`.
+        workers: processes; None takes one a processor.
+        pictures: draw the moving picture too.
+        quiet: no progress on stderr.
+
+    Returns:
+        One summary per plan, as written to its folder.
+
+    Raises:
+        ProxError: a trial failed; recordings up to then are kept.
+        KeyboardInterrupt: with a message of what was kept.
+    """
+    trials = [(plan, name) for plan in plans for name in plan.controllers]
+    ready([plan.folder for plan in plans])
+    try:
+        with Pool(workers or default_workers(len(trials))) as pool:
+            logs = _simulate(pool, trials, quiet)
+            grouped = [
+                [log for log, (owner, _) in zip(logs, trials, strict=True) if owner is plan]
+                for plan in plans
+            ]
+            summaries = []
+            for plan, own in zip(plans, grouped, strict=True):
+                summaries.append(static_summary(own))
+                write_text(plan.folder / "scenario.toml", plan.scenario.to_toml())
+                write_json(plan.folder / "run.json", _about(plan, own, origin))
+                write_json(plan.folder / "summary.json", summaries[-1])
+            _draw(pool, plans, grouped, pictures, quiet)
+    except KeyboardInterrupt:
+        kept = [str(path) for plan in plans for path in sorted(plan.folder.glob("*.mcap"))]
+        text = "kept: " + ", ".join(kept) if kept else "nothing was kept"
+        raise KeyboardInterrupt(text) from None
+    return summaries
+
+
+def check(scenario: Scenario, controllers: Sequence[str]) -> None:
+    """Sets everything up once, so that nothing is written where something does not fit.
+
+    Raises:
+        ProxError: what of the scenario, the robot or the sensors cannot be.
+    """
+    from proxcgal.sim.faults import FaultInjector
+    from proxcgal.sim.setup import Setup
+
+    setup = Setup.of(scenario)
+    for controller in controllers:
+        setup.make_controller(controller)
+    FaultInjector(scenario.faults, [mount.name for mount in setup.skin.mounts], scenario.seed)
+
+
+def combine(folder: Path, summaries: Sequence[Summary], origin: dict[str, Any]) -> None:
+    """Writes the numbers of several scenarios to the folder above theirs."""
+    write_json(folder / "run.json", origin)
+    write_json(folder / "summary.json", combined(summaries))
+
+
+def ready(folders: Sequence[Path]) -> None:
+    """Makes the folders, shows that they can be written, removes an earlier run's files.
+
+    Raises:
+        ConfigError: a folder cannot be made or written; none is left behind that was not there.
+    """
+    made: list[Path] = []
+    try:
+        for folder in folders:
+            missing = [p for p in (folder, *folder.parents) if not p.exists()]
+            for path in reversed(missing):
+                path.mkdir()
+                made.append(path)
+            with tempfile.TemporaryFile(dir=folder) as probe:
+                probe.write(b"proxcgal")
+    except OSError as error:
+        for path in reversed(made):
+            path.rmdir()
+        raise ConfigError(f"--out {folder}: cannot be written: {error.strerror or error}") from None
+    from proxcgal.sim.scenario import CONTROLLERS
+
+    for folder in folders:
+        for name in (*FILES, *(f"{controller}.mcap" for controller in CONTROLLERS)):
+            (folder / name).unlink(missing_ok=True)
+
+
+def _simulate(pool: Pool, trials: Sequence[tuple[Plan, str]], quiet: bool) -> list[TrialLog]:
+    jobs = [
+        functools.partial(_trial, plan.scenario, name, plan.folder / f"{name}.mcap")
+        for plan, name in trials
+    ]
+    seconds = [plan.scenario.duration for plan, _ in trials]
+    with Progress("simulating", seconds, "s", quiet=quiet) as progress:
+
+        def done(row: int, log: TrialLog) -> None:
+            numbers = log.summary()
+            progress.finished(
+                f"{log.scenario} {log.controller}: least true distance "
+                f"{numbers['true_min_m']:.3f} m, {seconds[row]:g} s simulated in {log.wall_s:.1f} s"
+            )
+
+        logs: list[TrialLog] = pool.run(jobs, progress.shares, done)
+    for log in logs:
+        if log.recording_failure:
+            warnings.warn(log.recording_failure, RuntimeWarning, stacklevel=2)
+    return logs
+
+
+def _trial(scenario: Scenario, controller: str, recording: Path, report: Report) -> TrialLog:
+    """One trial, in whichever process."""
+    from proxcgal.sim.recorder import Recorder
+    from proxcgal.sim.trial import run_trial
+
+    with warnings.catch_warnings(), Recorder(recording) as recorder:
+        # What there is to say of a model was said when the set-up was checked, and a recording
+        # that stops early is in the log.
+        warnings.simplefilter("ignore", ModelWarning)
+        warnings.simplefilter("ignore", RuntimeWarning)
+        return run_trial(scenario, controller, recorder=recorder, on_progress=report)
+
+
+def _draw(
+    pool: Pool,
+    plans: Sequence[Plan],
+    grouped: Sequence[Sequence[TrialLog]],
+    pictures: bool,
+    quiet: bool,
+) -> None:
+    from proxcgal.apps.drawing import draw_figures, draw_motion
+
+    jobs: list[Any] = []
+    for plan, logs in zip(plans, grouped, strict=True):
+        if pictures:  # first: it takes longest
+            jobs.append(functools.partial(draw_motion, plan.scenario, plan.folder))
+        jobs.append(functools.partial(draw_figures, plan.scenario, list(logs), plan.folder))
+    with Progress("drawing", [1.0] * len(jobs), "", quiet=quiet) as progress:
+        pool.run(jobs, progress.shares, lambda _, text: progress.finished(text))
+
+
+def _about(plan: Plan, logs: Sequence[TrialLog], origin: dict[str, Any]) -> dict[str, Any]:
+    """What `run.json` says: how it was made, and what each trial took and found."""
+    trials = {}
+    for log in logs:
+        modes, counts = np.unique(log.mode, return_counts=True)
+        trials[log.controller] = {
+            "wall_s": float(log.wall_s),
+            "ticks": len(log.time),
+            "tick_median_us": float(np.median(log.tick_us)),
+            "tick_p99_us": float(np.percentile(log.tick_us, 99)),
+            "findings": {str(reason): int(n) for reason, n in log.findings.items()},
+            "mode_ticks": {str(m): int(n) for m, n in zip(modes, counts, strict=True)},
+        }
+    return {**origin, "description": plan.scenario.description, "trials": trials}

@@ -1,0 +1,125 @@
+"""`proxcgal run`: simulate a scene with one or several controllers."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from proxcgal.apps.options import (
+    ControllerName,
+    Flag,
+    Folders,
+    Number,
+    Settings,
+    checked_workers,
+    flat,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from proxcgal.study.analysis import Summary
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """Simulate a scene with one or several controllers, and write what happened.
+
+    Writes summary.json, scenario.toml (the resolved scenario), figures, a moving picture, one
+    recording per controller and report.html to DIR.
+
+    Examples:
+      proxcgal run front_plane
+      proxcgal run side_plane --controller wb sm --seed 3 --out out/side
+      proxcgal run front_plane --set controller.d_min=0.25 simulation.dropout=0.1
+      proxcgal run my_scene.toml --robot my_arm.urdf --package-dir ~/robots
+    """
+
+    scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO")]
+    """A name that `proxcgal scenarios` lists, or a path to a TOML file."""
+    controller: Annotated[
+        tuple[ControllerName, ...], tyro.conf.arg(metavar="wb|sm|wb_known ...")
+    ] = ("wb", "sm", "wb_known")
+    """wb: the whole body avoids. sm: only the sensors' mounting points do, the baseline.
+    wb_known: wb on points of the scene itself, the ceiling."""
+    robot: Annotated[str | None, tyro.conf.arg(metavar="NAME|PATH", help_behavior_hint="")] = None
+    """A name that `proxcgal robots` lists, or a .urdf or .xml file, instead of the scenario's."""
+    package_dir: Folders = ()
+    """Where package:// paths of the robot's file are looked up."""
+    seed: Number = None
+    """Fixes every random draw; instead of the scenario's."""
+    set: Settings = ()
+    """Change keys of the scenario, values as in TOML: controller.d_min=0.25"""
+    out: Annotated[
+        Path | None, tyro.conf.arg(metavar="DIR", help_behavior_hint="(default: out/SCENARIO)")
+    ] = None
+    """Where results go; an earlier run's files there are replaced."""
+    workers: Number = None
+    """Processes that simulate; left out: one a processor."""
+    no_picture: Flag = False
+    """Leave the moving picture out."""
+    quiet: Flag = False
+    """No progress on stderr."""
+
+
+def run_command(options: RunOptions, command: str) -> int:
+    """Runs the trials; prints the table and the report's path."""
+    from proxcgal.apps.origin import origin
+    from proxcgal.apps.report import write_report
+    from proxcgal.apps.results import Plan, check, perform
+    from proxcgal.errors import ConfigError
+    from proxcgal.sim.scenario import load_scenario
+
+    if not options.controller:
+        raise ConfigError("--controller: none given, at least one of wb, sm, wb_known is needed")
+    workers = checked_workers(options.workers)
+    scenario = load_scenario(options.scenario, overrides(options))
+    controllers = tuple(dict.fromkeys(options.controller))
+    check(scenario, controllers)
+    folder = options.out or Path("out") / scenario.name
+    plan = Plan(scenario=scenario, controllers=controllers, folder=folder)
+    summaries = perform(
+        [plan],
+        origin(command),
+        workers=workers,
+        pictures=not options.no_picture,
+        quiet=options.quiet,
+    )
+    return conclude(summaries, write_report(plan.folder))
+
+
+def overrides(options: RunOptions) -> list[str]:
+    """Assignments of all options that change the scenario; --set comes last and wins."""
+    changes = []
+    if options.robot is not None:
+        path = Path(options.robot).expanduser()
+        is_file = path.suffix in (".urdf", ".xml")
+        changes.append("robot=" + json.dumps(str(path.absolute()) if is_file else options.robot))
+    folders = [str(path.expanduser().absolute()) for path in flat(options.package_dir)]
+    if folders:
+        changes.append("package_dirs=" + json.dumps(folders))
+    if options.seed is not None:
+        changes.append(f"seed={options.seed}")
+    return changes + flat(options.set)
+
+
+def conclude(summaries: Sequence[Summary], report: Path) -> int:
+    """Prints the table, what failed, and last the report's path; the exit code."""
+    import sys
+
+    from proxcgal.study.analysis import SELF_LIMIT_M, table
+
+    print(table(summaries))
+    failed = [s for s in summaries if s["failed"]]
+    for summary in failed:
+        print(
+            f"proxcgal: {summary['scenario']}: failed: the arm came within "
+            f"{summary['self_min_m']:.3f} m of itself, allowed is {SELF_LIMIT_M} m",
+            file=sys.stderr,
+        )
+    print(report)
+    return 1 if failed else 0

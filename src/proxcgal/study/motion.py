@@ -1,0 +1,96 @@
+"""The arm backing away, as a moving picture: recorded runs side by side, under one caption each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib import get_data_path
+from PIL import Image, ImageDraw, ImageFont
+
+from proxcgal.sim.pictures import Snapshot, draw, snapshots, write_gif
+from proxcgal.sim.recording import Recording
+from proxcgal.sim.setup import Setup
+from proxcgal.sim.world import Camera, World
+from proxcgal.study.figures import COLOURS, NAMES
+
+FPS = 10.0
+FRAMES = 80  # of the run; the last one is then held
+HELD = 12
+PANE = (400, 360)  # [px] width and height of one run's picture
+STRIP = 48  # [px] of text below it
+
+
+def motion_picture(
+    recordings: Sequence[Recording],
+    path: Path,
+    on_progress: Callable[[float], None] | None = None,
+) -> None:
+    """Writes a GIF of one scene under several controllers, side by side.
+
+    Args:
+        recordings: of one scenario; their ticks are repeated, which gives the clouds.
+        path: where to.
+        on_progress: told the share done, 0 to 1.
+
+    Raises:
+        SimulationError: there is no way to draw off screen.
+    """
+    setup = Setup.of(recordings[0].settings.scenario)
+    times = np.linspace(0.0, max(r.ticks[-1].given.time for r in recordings), FRAMES)
+    seen = [snapshots(recording, times.tolist()) for recording in recordings]
+    camera = camera_for(setup)
+    world = World(setup.robot, setup.scenario.obstacles)
+    frames = []
+    try:
+        for row, moment in enumerate(zip(*seen, strict=True)):
+            frame = Image.new("RGB", (PANE[0] * len(recordings), PANE[1] + STRIP), "white")
+            for column, (snapshot, recording) in enumerate(zip(moment, recordings, strict=True)):
+                pane = _pane(world, camera, snapshot, recording.settings.controller)
+                frame.paste(pane, (column * PANE[0], 0))
+            frames.append(frame)
+            if on_progress is not None:
+                on_progress((row + 1) / FRAMES)
+    finally:
+        world.close()
+    write_gif(frames + frames[-1:] * HELD, path, FPS)
+
+
+def camera_for(setup: Setup) -> Camera:
+    """Looks along the first obstacle's face, a little from the arm's side: it hides nothing."""
+    if not setup.scenario.obstacles:
+        return Camera()
+    box = setup.scenario.obstacles[0]
+    tool_W = np.asarray(setup.robot.tool_pose(setup.q0))[:3, 3]
+    obstacle_W = np.asarray(box.position)
+    normal_W = np.asarray(box.pose())[:3, int(np.argmin(box.size))]
+    away = normal_W if (tool_W - obstacle_W) @ normal_W > 0.0 else -normal_W
+    bearing = float(np.arctan2(away[1], away[0])) + np.deg2rad(68.0)  # of the camera, from above
+    middle = 0.5 * (tool_W + obstacle_W)
+    return Camera(
+        lookat_W=(0.6 * float(middle[0]), 0.6 * float(middle[1]), 0.42),
+        distance=2.15,
+        azimuth=bearing + float(np.pi),
+        elevation=float(np.deg2rad(-18.0)),
+    )
+
+
+def _pane(world: World, camera: Camera, snapshot: Snapshot, controller: str) -> Image.Image:
+    picture = Image.new("RGB", (PANE[0], PANE[1] + STRIP), "white")
+    picture.paste(Image.fromarray(draw(world, snapshot, PANE, camera)), (0, 0))
+    pen = ImageDraw.Draw(picture)
+    colour = COLOURS.get(controller, "black")
+    pen.rectangle((0, PANE[1], PANE[0], PANE[1] + 3), fill=colour)
+    top = PANE[1] + 8
+    pen.text((10, top), NAMES.get(controller, controller), font=_font(bold=True), fill=colour)
+    true = 1000.0 * snapshot.tick.truth.distance
+    text = f"t = {snapshot.tick.given.time:.1f} s    true distance {true:.0f} mm"
+    pen.text((10, top + 18), text, font=_font(), fill="black")
+    return picture
+
+
+def _font(*, bold: bool = False) -> Any:
+    name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
+    return ImageFont.truetype(Path(get_data_path()) / "fonts" / "ttf" / name, 14)

@@ -1,0 +1,169 @@
+"""Both controllers' closest pairs on the same posture, in the form of the paper's Fig. 3."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from proxcgal import _core
+from proxcgal.study.figures import DPI
+
+if TYPE_CHECKING:
+    from proxcgal.models.robots import Robot
+
+Array = NDArray[np.float64]
+
+PAIR_COLOUR = "#C80000"
+ROBOT_POINTS = 4000  # that are drawn, at most
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PairView:
+    """One controller's closest pair on one posture, as Fig. 3 shows it."""
+
+    title: str
+    robot_W: Array  # (n, 3) [m] mesh vertices, or sensor mounting points
+    context_W: Array  # (m, 3) [m] the rest of the arm, drawn faintly; may be empty
+    obstacle_W: Array  # (k, 3) [m]
+    control_W: Array  # (3,) [m] point of the robot
+    nearest_W: Array  # (3,) [m] point of the obstacle
+    link: str
+
+    @property
+    def distance(self) -> float:
+        """Length of the pair [m]."""
+        return float(np.linalg.norm(self.control_W - self.nearest_W))
+
+
+def pair_figure(rows: Sequence[Sequence[PairView]], *, title: str) -> Figure:
+    """Closest pairs side by side, a row a scene: the form of [WA] Fig. 3.
+
+    The robot (or its sensors) as points, the obstacle in blue, a red arrow from the obstacle's
+    point to the control point.
+    """
+    columns, height = len(rows[0]), 3.9 * len(rows) + 0.3
+    figure = Figure(figsize=(3.8 * columns, height), dpi=DPI)
+    FigureCanvasAgg(figure)
+    figure.suptitle(title, fontsize=12, fontweight="bold", y=1.0 - 0.1 / height)
+    figure.subplots_adjust(
+        left=0.0, right=0.96, bottom=0.02, top=1.0 - 0.8 / height, wspace=0.04, hspace=0.16
+    )
+    for i, row in enumerate(rows):
+        everything = np.vstack([np.vstack((v.robot_W, v.context_W, v.obstacle_W)) for v in row])
+        for j, view in enumerate(row):
+            ax = figure.add_subplot(len(rows), columns, i * columns + j + 1, projection="3d")
+            _draw_pair(ax, view, everything)
+            letter = "abcdefgh"[i * columns + j]
+            text = f"{view.link}, {1000 * view.distance:.0f} mm"
+            ax.text2D(
+                0.5, 1.05, f"({letter}) {view.title}", transform=ax.transAxes, ha="center",
+                fontsize=10,
+            )  # fmt: skip
+            ax.text2D(
+                0.5, 0.99, text, transform=ax.transAxes, ha="center", fontsize=9, color=PAIR_COLOUR
+            )
+    return figure
+
+
+def _draw_pair(ax: Any, view: PairView, everything: Array) -> None:
+    low, high = everything.min(axis=0), everything.max(axis=0)
+    ax.set_proj_type("ortho")
+    ax.view_init(elev=20.0, azim=-62.0)
+    ax.set_box_aspect(high - low, zoom=0.98)
+    for setter, a, b in zip((ax.set_xlim, ax.set_ylim, ax.set_zlim), low, high, strict=True):
+        setter(a, b)
+    ax.computed_zorder = False  # the arrow belongs on top, whatever lies before it
+    plain: dict[str, Any] = {"linewidths": 0, "depthshade": False}
+    ax.scatter(*view.obstacle_W.T, s=2.0, color="#5B93E6", zorder=1, **plain)
+    if len(view.context_W):
+        ax.scatter(*view.context_W.T, s=0.8, color="#D4D4D4", zorder=2, **plain)
+    size, colour, alpha = (1.6, "#606060", 0.6) if len(view.robot_W) > 200 else (14, "black", 1.0)
+    ax.scatter(*view.robot_W.T, s=size, color=colour, alpha=alpha, zorder=3, **plain)
+    ax.quiver(
+        *view.nearest_W,
+        *(view.control_W - view.nearest_W),
+        color=PAIR_COLOUR,
+        linewidth=2.0,
+        arrow_length_ratio=min(0.5, 0.06 / max(view.distance, 1e-9)),
+        zorder=5,
+    )
+    ax.set_xlabel("x [m]", fontsize=8, labelpad=-4)
+    ax.set_ylabel("y [m]", fontsize=8, labelpad=-4)
+    ax.set_zlabel("z [m]", fontsize=8, labelpad=-4)
+    ax.tick_params(labelsize=7, pad=-2)
+    ax.locator_params(nbins=4)
+    for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
+        axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
+        axis._axinfo["grid"].update(color="#E4E4E4", linewidth=0.5)
+
+
+def whole_body_view(
+    robot: Robot, q: Array, points_W: Array, *, drawn_W: Array, title: str
+) -> PairView:
+    """The pair that the whole-body controller acts on: Algorithm 2 on the control meshes.
+
+    Args:
+        robot: its control meshes are drawn by their vertices.
+        q: posture, (n_q,) [rad].
+        points_W: the obstacle, (n, 3) [m].
+        drawn_W: what of it is drawn, (m, 3) [m].
+        title: above the view.
+
+    Raises:
+        GeometryError: no point.
+    """
+    pair = _core.closest_pair(robot, q, points_W)
+    return PairView(
+        title=title,
+        robot_W=_thinned(vertices(robot, q), ROBOT_POINTS),
+        context_W=np.zeros((0, 3)),
+        obstacle_W=drawn_W,
+        control_W=np.array(pair.surface_W),
+        nearest_W=np.array(pair.obstacle_W),
+        link=pair.link,
+    )
+
+
+def sensor_view(
+    robot: Robot, skin: _core.Skin, q: Array, points_W: Array, *, drawn_W: Array, title: str
+) -> PairView:
+    """The pair that the baseline acts on: the sensor's mounting point nearest to any point.
+
+    Args: as `whole_body_view`, and `skin` for the mounting points.
+    """
+    poses = dict(zip(robot.link_names, np.asarray(robot.link_poses(q)), strict=True))
+    mounts_W = np.array([(poses[m.link] @ np.asarray(m.T_LS))[:3, 3] for m in skin.mounts])
+    squared = ((points_W[:, None, :] - mounts_W[None, :, :]) ** 2).sum(axis=2)
+    point, mount = np.unravel_index(int(squared.argmin()), squared.shape)
+    return PairView(
+        title=title,
+        robot_W=mounts_W,
+        context_W=_thinned(vertices(robot, q), ROBOT_POINTS),
+        obstacle_W=drawn_W,
+        control_W=mounts_W[mount],
+        nearest_W=np.array(points_W[point]),
+        link=skin.mounts[mount].link,
+    )
+
+
+def vertices(robot: Robot, q: Array) -> Array:
+    """Vertices of all control meshes in world, (n, 3) [m]."""
+    parts = []
+    for name, T_WL in zip(robot.link_names, np.asarray(robot.link_poses(q)), strict=True):
+        vertices_L, _ = robot.mesh(name)
+        parts.append(np.asarray(vertices_L) @ T_WL[:3, :3].T + T_WL[:3, 3])
+    return np.vstack(parts)
+
+
+def _thinned(points: Array, most: int) -> Array:
+    """At most that many of the points, the same ones each time."""
+    if len(points) <= most:
+        return points
+    rows = np.random.default_rng(0).choice(len(points), most, replace=False)
+    return points[np.sort(rows)]
