@@ -17,6 +17,7 @@ CPP_LAYER_OF = {
     "types": "base",
     "error": "base",
     "box": "base",
+    "require": "base",
     "stopwatch": "base",
     "geometry": "geometry",
     "robot": "robot",
@@ -29,9 +30,7 @@ CPP_LAYER_OF = {
 }
 # What stages take from one another: each entry is one type too many outside of `types`.
 SHARED_STAGES = {
-    ("pipeline/command", "pipeline/solve"),  # Solution: the levels that command may leave out
     ("pipeline/distance", "pipeline/filter"),  # Method
-    ("pipeline/task", "pipeline/sense"),
 }
 
 PYTHON_LAYERS = ("base", "models", "sim", "study", "apps")

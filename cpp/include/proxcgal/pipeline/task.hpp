@@ -1,12 +1,16 @@
 #pragma once
-#include <string>
+#include <span>
 #include <variant>
 
-#include "proxcgal/pipeline/sense.hpp"
 #include "proxcgal/robot.hpp"
 #include "proxcgal/types.hpp"
 
 namespace proxcgal {
+
+/// Decreasing bell of [iCAT]: 1 for x <= a, 0 for x >= b, a cosine between. Needs a <= b.
+double decreasing(double x, double a, double b);
+/// 1 - decreasing.
+double increasing(double x, double a, double b);
 
 /// Keep the robot away from the nearest obstacle: [WA] eqs. (4) to (7).
 struct Avoidance {
@@ -28,39 +32,52 @@ struct Reach {
 /// Keep every joint off its position limits.
 struct JointLimits {
   double gain = 0.2;    ///< [1/s] towards the middle
-  double margin = 0.3;  ///< [rad] or [m] where the activation begins
+  double margin = 0.3;  ///< [rad] or [m] from a limit, where the activation begins
   void validate() const;
 };
 
 /// Keep the tool above a height.
 struct MinimumAltitude {
   double height = 0.30;  ///< [m]
-  double buffer = 0.10;  ///< [m]
+  double buffer = 0.10;  ///< [m] above it, where the activation begins
   double gain = 0.5;     ///< [1/s]
   void validate() const;
 };
 
-/// Keep one arm's manipulability up: sqrt(det(J J')) of the tool's linear and angular rows.
+/// Keep one arm's manipulability up: mu = sqrt(det(J J')) of the tool's linear and angular rows,
+/// over the columns of that arm's joints.
 struct Manipulability {
   double target = 0.12;  ///< [-] the rate pulls towards it
-  double low = 0.02;     ///< [-] active below
+  double low = 0.02;     ///< [-] fully active below
   double high = 0.05;    ///< [-] inactive above
   double gain = 0.1;     ///< [1/s]
+  int first_joint = 0;   ///< of the arm: 6 on the second arm of a 12-joint robot
+  int joints = 0;        ///< of the arm; 0 takes all from `first_joint` on
   void validate() const;
 };
 
 using TaskSpec = std::variant<Avoidance, Reach, JointLimits, MinimumAltitude, Manipulability>;
 const char* task_name(const TaskSpec& spec);
+/// @throws ConfigError  with the field, its value and its bounds
 void validate(const TaskSpec& spec);
+/// What only shows on a robot: manipulability needs six joints, inside the robot's own.
+/// @throws ConfigError
+void validate(const TaskSpec& spec, const Robot& robot);
 
 /// One (control point, obstacle point) pair that avoidance acts on.
 struct ControlPair {
   int link = -1;
-  Vector3 control_W = Vector3::Zero();   ///< surface point, or sensor mounting point (SM)
+  Vector3 control_W = Vector3::Zero();  ///< surface point, or sensor mounting point (SM)
   Vector3 obstacle_W = Vector3::Zero();
   Vector3 obstacle_velocity_W = Vector3::Zero();  ///< the x_o term of eq. (4) [m/s]
-  double distance = kInfinity;
+  double distance = kInfinity;  ///< [m] negative where the obstacle is inside: turns the normal
+  /// Unit, from obstacle to robot: taken where the points coincide and leave none; zero for none.
+  Vector3 fallback_normal_W = Vector3::Zero();
 };
+
+/// A scalar row of a smaller norm is left as it is: scaling would blow up its rate, and the
+/// solver's damping lets it fade out. The monitor is told (facts, section 2).
+inline constexpr double kSmallRowNorm = 0.01;
 
 /// A task whose rows were built, with what the monitor wants to know of them.
 struct BuiltTask {
@@ -68,16 +85,29 @@ struct BuiltTask {
   double smallest_row_norm = kInfinity;  ///< of scalar rows, before scaling
 };
 
-/// @name Rows for one tick; scalar rows are scaled to unit norm (facts, section 2)
+/// @name Rows for one tick
+/// Rows, rates and activations are finite for finite input. Scalar rows are scaled to unit norm,
+/// their rates alike. Nothing allocates.
 /// @{
+
+/// Row n'J_lin at each control point, n from the obstacle to the robot; rate n'v_obstacle +
+/// gain (d_min + buffer - d). Where the two points coincide and there is no fallback normal the
+/// row is zero, and its norm is told.
+/// @param pairs  the most important first; one row each, at most kMaxRows
 void build_avoidance(const Avoidance& spec, const Robot& robot, const Posture& posture,
                      std::span<const ControlPair> pairs, BuiltTask& out);
-void build_reach(const Reach& spec, const Robot& robot, const Posture& posture,
-                 const Pose& goal_WT, BuiltTask& out);
+/// Six rows: gain (x_goal - x_ee) and gain n theta, each shortened to its bound.
+void build_reach(const Reach& spec, const Robot& robot, const Posture& posture, const Pose& goal_WT,
+                 BuiltTask& out);
+/// J = I, towards the middle of the joint's range. A joint with one limit only is pulled back to
+/// `margin` inside it, one with none is left alone.
 void build_joint_limits(const JointLimits& spec, const Robot& robot, const Posture& posture,
                         BuiltTask& out);
-void build_minimum_altitude(const MinimumAltitude& spec, const Robot& robot,
-                            const Posture& posture, BuiltTask& out);
+/// The tool's height; rate gain (height + buffer - z).
+void build_minimum_altitude(const MinimumAltitude& spec, const Robot& robot, const Posture& posture,
+                            BuiltTask& out);
+/// The gradient of mu; rate gain (target - mu). At a singular posture, where mu has an edge, the
+/// slope of one of its sides.
 void build_manipulability(const Manipulability& spec, const Robot& robot, const Posture& posture,
                           BuiltTask& out);
 /// @}
@@ -85,7 +115,8 @@ void build_manipulability(const Manipulability& spec, const Robot& robot, const 
 /// The norm of the avoidance row n'J of a pair: how well joints can open it.
 double row_norm(const Robot& robot, const Posture& posture, const ControlPair& pair);
 
-/// Angle-axis vector that turns `from` into `to`, in world [rad].
+/// Angle-axis vector that turns `from` into `to`, in world [rad]: at most pi long. At a half turn
+/// one of the two equal axes.
 Vector3 rotation_error(const Eigen::Matrix3d& from, const Eigen::Matrix3d& to);
 
 }  // namespace proxcgal
