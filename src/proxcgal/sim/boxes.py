@@ -43,6 +43,13 @@ def surface(size: Sequence[float], T_WO: Array) -> tuple[Array, NDArray[np.int32
     return _CORNERS * np.asarray(size) @ T_WO[:3, :3].T + T_WO[:3, 3], _TRIANGLES
 
 
+def nearest_point(size: Sequence[float], T_WO: Array, point_W: Array) -> Array:
+    """(3,) the point of a solid box nearest to a point, in world."""
+    half = 0.5 * np.asarray(size)
+    inside: Array = np.clip(T_WO[:3, :3].T @ (point_W - T_WO[:3, 3]), -half, half)
+    return T_WO[:3, :3] @ inside + T_WO[:3, 3]
+
+
 def points(size: Sequence[float], T_WO: Array, spacing: float) -> Array:
     """(n, 3) points of the surface in world, at most `spacing` apart along its edges [m]."""
     ticks = [_ticks(edge, spacing) for edge in size]

@@ -1,0 +1,164 @@
+"""From a scenario to what runs: robot, sensors, controller settings, start and goal."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxcgal import _core
+from proxcgal.errors import ConfigError
+from proxcgal.models import Robot, load_robot, ring_skin
+from proxcgal.sim import boxes
+from proxcgal.sim.scenario import CONTROLLERS, Scenario
+from proxcgal.sim.scenario_keys import Controller, Section
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Everything of a scenario that does not change while it runs."""
+
+    scenario: Scenario
+    robot: Robot
+    skin: _core.Skin
+    q0: Array  #: (n_q,)
+    goal: Array  #: (4, 4) T_WT
+
+    @classmethod
+    def of(cls, scenario: Scenario, robot: Robot | None = None) -> Self:
+        """Loads the robot, unless one is given, and puts the sensors on it.
+
+        Raises:
+            ConfigError: what of the scenario does not fit the robot.
+            ModelError: the robot's description.
+        """
+        robot = robot or make_robot(scenario)
+        q0 = _start(scenario, robot)
+        return cls(scenario, robot, make_skin(scenario, robot), q0, _goal(scenario, robot, q0))
+
+    def uses_known_points(self, controller: str) -> bool:
+        """Does this controller get points of the scene itself instead of scans?"""
+        return controller == "wb_known" or self.scenario.perception == "known"
+
+    def known_points(self, spacing: float = 0.01) -> Array:
+        """(n, 3) points of the scene's own surfaces, at most `spacing` apart [m]."""
+        clouds = [boxes.points(box.size, box.pose(), spacing) for box in self.scenario.obstacles]
+        return np.concatenate([*clouds, np.empty((0, 3))])
+
+    def make_controller(self, controller: str, known_points: int = 0) -> _core.Controller:
+        """The controller of that name, with room for that many known points.
+
+        Raises:
+            ConfigError: an unknown name, a setting out of the core's bounds.
+        """
+        if controller not in CONTROLLERS:
+            raise ConfigError(f"controller {controller!r}: there are {', '.join(CONTROLLERS)}")
+        settings = self.scenario.controller
+        config = _core.ControllerConfig(
+            control_point="sensor" if controller == "sm" else "whole_body",
+            tasks=[_task(name, settings) for name in settings.tasks],
+            filter=_core.FilterConfig(**_keys(settings.filter)),
+            solver=_core.SolverConfig(**_keys(settings.solver)),
+            monitor=_core.MonitorConfig(**_keys(settings.monitor)),
+            period=1.0 / self.scenario.simulation.control_hz,
+            min_row_norm=settings.min_row_norm,
+            avoid_links=list(settings.avoid_links),
+            method=settings.method,
+            max_points=max(known_points, 1),
+        )
+        return _core.Controller(self.robot, self.skin, config)
+
+    def mesh_hashes(self) -> dict[str, str]:
+        """SHA-256 of each link's meshes, as `LINK full` and `LINK control`."""
+        return {
+            f"{link} {kind}": digest
+            for link, kinds in self.robot.mesh_hashes.items()
+            for kind, digest in kinds.items()
+        }
+
+
+def make_robot(scenario: Scenario) -> Robot:
+    """The scenario's robot. Raises: ConfigError, ModelError."""
+    return load_robot(
+        scenario.robot,
+        package_dirs=scenario.package_dirs,
+        vertices_per_link=scenario.vertices_per_link or None,
+        speed_limits=scenario.limits.speed,
+        acceleration_limits=scenario.limits.acceleration,
+    )
+
+
+def make_skin(scenario: Scenario, robot: Robot) -> _core.Skin:
+    """The scenario's sensors on this robot. Raises: ConfigError for a link it does not have."""
+    model = _core.SensorModel(**_keys(scenario.skin.sensor))
+    names = robot.link_names
+    unknown = [
+        f"skin.rings.{place}.link = {ring.link!r}: {robot.name} has the links {', '.join(names)}"
+        for place, ring in enumerate(scenario.skin.rings)
+        if ring.link not in names
+    ]
+    if unknown:
+        raise ConfigError("\n".join(f"scenario {scenario.name}: {line}" for line in unknown))
+    skin = _core.Skin([], model)
+    for ring in scenario.skin.rings:
+        height = {} if ring.standoff is None else {"standoff": ring.standoff}
+        skin = skin + ring_skin(
+            robot, ring.link, ring.at, ring.sensors, model=model, phase=ring.phase, **height
+        )
+    return skin
+
+
+def _start(scenario: Scenario, robot: Robot) -> Array:
+    q0 = np.array(scenario.q0, np.float64)
+    if len(q0) != robot.n_q:
+        raise ConfigError(
+            f"scenario {scenario.name}: q0 has {len(q0)} values: {robot.name} has {robot.n_q} "
+            f"joints, {', '.join(robot.joint_names)}"
+        )
+    outside = [
+        f"scenario {scenario.name}: q0.{joint} = {q0[joint]:g}: {robot.joint_names[joint]} of "
+        f"{robot.name} goes from {robot.q_min[joint]:g} to {robot.q_max[joint]:g}"
+        for joint in np.flatnonzero((q0 < robot.q_min) | (q0 > robot.q_max))
+    ]
+    if outside:
+        raise ConfigError("\n".join(outside))
+    return q0
+
+
+def _goal(scenario: Scenario, robot: Robot, q0: Array) -> Array:
+    T_WT = np.array(robot.tool_pose(q0))
+    goal = scenario.goal
+    if goal.offset is not None:
+        T_WT[:3, 3] += goal.offset
+    elif goal.position is not None:
+        T_WT[:3, 3] = goal.position
+    if goal.rpy is not None:
+        T_WT[:3, :3] = boxes.rotation(goal.rpy)
+    return T_WT
+
+
+def _task(name: str, settings: Controller) -> Any:
+    match name:
+        case "avoidance":
+            return _core.Avoidance(
+                d_min=settings.d_min, buffer=settings.buffer, gain=settings.avoid_gain,
+                nearest=settings.nearest,
+            )  # fmt: skip
+        case "reach":
+            return _core.Reach(
+                gain=settings.reach_gain, max_linear=settings.max_linear,
+                max_angular=settings.max_angular,
+            )  # fmt: skip
+        case "joint_limits":
+            return _core.JointLimits(**_keys(settings.joint_limits))
+        case "minimum_altitude":
+            return _core.MinimumAltitude(**_keys(settings.minimum_altitude))
+    return _core.Manipulability(**_keys(settings.manipulability))
+
+
+def _keys(section: Section) -> dict[str, Any]:
+    return section.model_dump()

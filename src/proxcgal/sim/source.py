@@ -1,0 +1,115 @@
+"""Where a tick's inputs come from: the simulated world, or a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxcgal import _core
+from proxcgal.sim.ranges import ZONES, RangeModel
+from proxcgal.sim.setup import Setup
+from proxcgal.sim.ticks import TickInput
+from proxcgal.sim.world import World
+
+Array = NDArray[np.float64]
+
+
+class Source(Protocol):
+    """What the run reads its inputs from, and tells its commands."""
+
+    def read(self) -> TickInput | None:
+        """The next tick's inputs; None at the end."""
+
+    def command(self, qd: Array) -> None:
+        """What the arm is told for the time until the next tick (n_q,)."""
+
+
+class RecordedSource:
+    """The inputs of a recording, as they were; commands change nothing."""
+
+    def __init__(self, inputs: Sequence[TickInput]) -> None:
+        """Args: `inputs` in their order."""
+        self._inputs = iter(inputs)
+
+    def read(self) -> TickInput | None:
+        """The next recorded inputs; None at the end."""
+        return next(self._inputs, None)
+
+    def command(self, qd: Array) -> None:
+        """Nothing moves: it happened already."""
+
+
+class SimulatedSource:
+    """The arm follows its velocity commands exactly, the sensors measure on the way.
+
+    A scan is measured where the arm was at the scan's own stamp, and delivered to the first tick
+    at or after it.
+    """
+
+    def __init__(self, setup: Setup, world: World | None, seed: int) -> None:
+        """Args: without a `world` nothing is sensed."""
+        settings = setup.scenario.simulation
+        self._setup = setup
+        self._world = world
+        self._period = 1.0 / settings.control_hz
+        self._ticks = max(round(setup.scenario.duration * settings.control_hz), 1)
+        self._tick = 0
+        self._q = setup.q0.copy()
+        self._qd = np.zeros_like(self._q)
+        sensors = len(setup.skin)
+        self._ranges = RangeModel(settings, setup.scenario.skin.sensor, sensors, seed)
+        self._mounting = settings.mounting
+        self._scan_hz = settings.sensor_hz
+        turns = np.arange(sensors) / sensors if settings.stagger else np.zeros(sensors)
+        self._phase: Array = turns / settings.sensor_hz
+        self._scans = np.zeros(sensors, np.int64)
+        links = list(setup.robot.link_names)
+        self._links = [links.index(mount.link) for mount in setup.skin.mounts]
+        self._T_LS = [np.array(mount.T_LS) for mount in setup.skin.mounts]
+        #: (sensors, 64) true where the last scan really saw the robot itself.
+        self.saw_robot: NDArray[np.bool_] = np.zeros((sensors, ZONES), bool)
+
+    def read(self) -> TickInput | None:
+        """Moves the arm by the last command and collects the scans made on the way."""
+        if self._tick == self._ticks:
+            return None
+        time = self._tick * self._period
+        before, start = self._q, time - self._period
+        if self._tick > 0:
+            self._q = before + self._qd * self._period
+        scans: list[_core.Scan] = []
+        while self._world is not None:
+            stamps = self._scans / self._scan_hz + self._phase
+            stamp = float(stamps.min())
+            if stamp > time:
+                break
+            rows = [int(row) for row in np.flatnonzero(stamps == stamp)]
+            scans += self._measure(rows, stamp, before + self._qd * (stamp - start))
+        self._tick += 1
+        return TickInput(time, self._q, self._setup.goal, tuple(scans), self._world is None)
+
+    def command(self, qd: Array) -> None:
+        """Velocity until the next tick (n_q,)."""
+        self._qd = qd
+
+    def _measure(self, rows: list[int], stamp: float, q: Array) -> list[_core.Scan]:
+        """Scans of the sensors that measure together; they share one index."""
+        assert self._world is not None
+        self._world.place(q)
+        poses_W = self._setup.robot.link_poses(q)
+        rays = self._ranges.rays_S
+        lengths, own = np.empty((len(rows), len(rays))), np.empty((len(rows), len(rays)), bool)
+        for at, row in enumerate(rows):
+            T_WS = poses_W[self._links[row]] @ self._T_LS[row]
+            hits = self._world.cast(T_WS[:3, 3], rays @ T_WS[:3, :3].T, self._mounting)
+            lengths[at], own[at] = hits.length, hits.robot
+        index = int(self._scans[rows[0]])
+        ranges, status = self._ranges.measure(rows, index, lengths)
+        self.saw_robot[rows] = self._ranges.pick(lengths, own)
+        self._scans[rows] += 1
+        return [
+            _core.Scan(row, index, stamp, ranges[at], status[at]) for at, row in enumerate(rows)
+        ]

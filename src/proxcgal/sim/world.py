@@ -1,0 +1,291 @@
+"""The simulated world: MuJoCo casts the sensors' rays and draws the pictures.
+
+The only module that knows MuJoCo. Nothing is stepped: the arm follows its velocity commands
+exactly, so a pose is set, and rays and pictures are taken at it.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxcgal.errors import SimulationError
+
+
+def _off_screen_library() -> str:
+    """What to draw with where there is no display; "disable" where nothing can."""
+    for backend, library in (("egl", "libEGL.so.1"), ("osmesa", "libOSMesa.so.8")):
+        try:
+            ctypes.CDLL(library)
+        except OSError:
+            continue
+        return backend
+    return "disable"
+
+
+if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("MUJOCO_GL")):
+    os.environ["MUJOCO_GL"] = _off_screen_library()  # read once, by the import
+
+_TOO_LATE = "mujoco" in sys.modules
+import mujoco  # noqa: E402
+
+if TYPE_CHECKING:
+    from proxcgal.models.robots import Robot
+    from proxcgal.sim.scenario_keys import Obstacle
+
+Array = NDArray[np.float64]
+
+Color = tuple[float, float, float, float]
+
+#: Group of what rays meet; the floor is drawn, never cast: it is not in any cloud.
+_CAST_GROUP = np.array([1, 0, 0, 0, 0, 0], np.uint8)
+_DRAWN_ONLY = 1
+_LINK_COLORS = ((0.83, 0.84, 0.86, 1.0), (0.45, 0.62, 0.76, 1.0))
+_OBSTACLE_COLOR = (0.98, 0.72, 0.35, 0.4)
+
+
+@dataclass(frozen=True, slots=True)
+class Spheres:
+    """Points to draw."""
+
+    centers_W: Array  #: (n, 3) [m]
+    radius: float  #: [m]
+    color: Color
+
+
+@dataclass(frozen=True, slots=True)
+class Arrow:
+    """An arrow to draw."""
+
+    tail_W: Array  #: (3,) [m]
+    tip_W: Array  #: (3,) [m]
+    width: float  #: [m]
+    color: Color
+
+
+@dataclass(frozen=True, slots=True)
+class Camera:
+    """Where a picture is taken from."""
+
+    lookat_W: tuple[float, ...] = (0.35, 0.05, 0.45)  #: (3,) [m]
+    distance: float = 2.2  #: [m]
+    azimuth: float = 2.2  #: [rad] direction of view about z, 0 along x
+    elevation: float = -0.35  #: [rad] negative looks down
+
+
+@dataclass(frozen=True, slots=True)
+class Hits:
+    """First surfaces along rays."""
+
+    length: Array  #: (n,) [m] along the ray, inf where nothing is hit
+    robot: NDArray[np.bool_]  #: (n,) true where the robot itself is hit
+
+
+class World:
+    """A robot's full-resolution links and the obstacles, at one posture at a time."""
+
+    def __init__(self, robot: Robot, obstacles: Sequence[Obstacle] = ()) -> None:
+        """Builds the scene.
+
+        Args:
+            robot: its `full_mesh` gives what rays meet, its `link_poses` where.
+            obstacles: boxes in the base frame.
+
+        Raises:
+            SimulationError: MuJoCo refuses a mesh, with the link's name.
+        """
+        self._robot = robot
+        self._warnings: list[str] = []
+        mujoco.set_mju_user_warning(self._warnings.append)
+        self._model = self._compile(obstacles)
+        self._data = mujoco.MjData(self._model)
+        self._renderers: dict[tuple[int, int], Any] = {}
+        self.place(np.zeros(robot.n_q))
+
+    def place(self, q: Array) -> None:
+        """Puts every link where the robot's kinematics has it.
+
+        Raises:
+            SimulationError: `q` gives no finite pose, or MuJoCo warned.
+        """
+        poses = self._robot.link_poses(q)
+        if not np.isfinite(poses).all():
+            raise SimulationError(f"the arm has no finite pose at q = {np.asarray(q).tolist()}")
+        for row, T_WL in enumerate(poses):
+            self._data.mocap_pos[row] = T_WL[:3, 3]
+            self._data.mocap_quat[row] = _quaternion(T_WL[:3, :3])
+        mujoco.mj_kinematics(self._model, self._data)
+        self._check()
+
+    def cast(self, origin_W: Array, directions_W: Array, start: float = 0.0) -> Hits:
+        """First hit of each ray on any surface of the robot or the scene.
+
+        No link is left out: a sensor sees its own arm. Hits nearer than `start` belong to the
+        sensor's own mounting; such a ray goes on behind them.
+
+        Args:
+            origin_W: (3,) [m].
+            directions_W: (n, 3), unit length.
+            start: [m] along the ray.
+        """
+        n = len(directions_W)
+        directions = np.ascontiguousarray(directions_W, np.float64)
+        origin = np.ascontiguousarray(origin_W, np.float64)
+        length, geom = np.empty(n), np.empty(n, np.int32)
+        mujoco.mj_multiRay(
+            self._model, self._data, origin, directions.ravel(), _CAST_GROUP, True, -1,
+            geom, length, None, n, mujoco.mjMAXVAL,
+        )  # fmt: skip
+        for ray in np.flatnonzero((length >= 0.0) & (length < start)):
+            self._cast_from(origin, directions[ray], start, length, geom, int(ray))
+        self._check()
+        missed = geom < 0
+        length[missed] = np.inf
+        return Hits(length, ~missed & (self._model.geom_bodyid[geom] > 0))  # 0: the scene
+
+    def picture(
+        self,
+        marks: Iterable[Spheres | Arrow] = (),
+        size: tuple[int, int] = (640, 480),
+        camera: Camera | None = None,
+    ) -> NDArray[np.uint8]:
+        """The scene at its posture, with marks drawn into it.
+
+        Args:
+            marks: what MuJoCo knows nothing of: clouds, pairs, frames.
+            size: width and height in pixels, at most 1920 x 1080.
+            camera: where to look from.
+
+        Returns:
+            (height, width, 3).
+
+        Raises:
+            SimulationError: there is no way to draw off screen.
+        """
+        camera = camera or Camera()
+        view = mujoco.MjvCamera()
+        view.lookat[:] = camera.lookat_W
+        view.distance = camera.distance
+        view.azimuth, view.elevation = np.rad2deg([camera.azimuth, camera.elevation])
+        renderer = self._renderer(size)
+        renderer.update_scene(self._data, view)
+        for mark in marks:
+            _draw(renderer.scene, mark)
+        pixels: NDArray[np.uint8] = renderer.render().copy()
+        self._check()
+        return pixels
+
+    def close(self) -> None:
+        """Frees what drawing holds."""
+        while self._renderers:
+            self._renderers.popitem()[1].close()
+
+    def _cast_from(
+        self, origin: Array, direction: Array, start: float, length: Array,
+        geom: NDArray[np.int32], ray: int,
+    ) -> None:  # fmt: skip
+        found = np.empty(1, np.int32)
+        beyond = mujoco.mj_ray(
+            self._model, self._data, origin + start * direction, direction, _CAST_GROUP, True,
+            -1, found, None,
+        )  # fmt: skip
+        length[ray], geom[ray] = start + beyond, found[0]
+
+    def _check(self) -> None:
+        numbers = [int(number) for number in self._data.warning.number]
+        if any(numbers) and not self._warnings:
+            self._warnings.append(f"warning counters {numbers}")
+        if self._warnings:
+            told, self._warnings[:] = "; ".join(self._warnings), []
+            raise SimulationError(f"MuJoCo warned: {told}")
+
+    def _compile(self, obstacles: Sequence[Obstacle]) -> Any:
+        spec = mujoco.MjSpec()
+        spec.option.disableflags = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+        for row, name in enumerate(self._robot.link_names):
+            vertices_L, triangles = self._robot.full_mesh(name)
+            mesh = spec.add_mesh(name=name, inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL)
+            mesh.uservert = np.asarray(vertices_L, np.float64).ravel()
+            mesh.userface = np.asarray(triangles, np.int32).ravel()
+            body = spec.worldbody.add_body(name=name, mocap=True)
+            body.add_geom(
+                type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, contype=0, conaffinity=0,
+                rgba=_LINK_COLORS[row % 2],
+            )  # fmt: skip
+        for box in obstacles:
+            spec.worldbody.add_geom(
+                type=mujoco.mjtGeom.mjGEOM_BOX, size=0.5 * np.asarray(box.size),
+                pos=box.position, quat=_quaternion(box.pose()[:3, :3]), contype=0, conaffinity=0,
+                rgba=_OBSTACLE_COLOR,
+            )  # fmt: skip
+        _furnish(spec)
+        try:
+            return spec.compile()
+        except ValueError as error:
+            raise SimulationError(f"MuJoCo refuses the scene: {error}") from None
+
+    def _renderer(self, size: tuple[int, int]) -> Any:
+        if size not in self._renderers:
+            try:
+                self._renderers[size] = mujoco.Renderer(self._model, size[1], size[0])
+            except Exception as error:  # each GL backend fails in its own way
+                cure = "install libegl1 and libgl1-mesa-dri, or libosmesa6"
+                if _TOO_LATE:
+                    cure = "mujoco was imported before proxcgal.sim: import that first"
+                backend = os.environ.get("MUJOCO_GL")
+                raise SimulationError(
+                    f"cannot draw off screen with MUJOCO_GL={backend}: {error}; {cure}"
+                ) from None
+        return self._renderers[size]
+
+
+def _quaternion(rotation: Array) -> Array:
+    quaternion = np.empty(4)
+    mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(rotation).ravel())
+    return quaternion
+
+
+def _furnish(spec: Any) -> None:
+    """Light, sky and floor: only for pictures."""
+    spec.visual.global_.offwidth, spec.visual.global_.offheight = 1920, 1080
+    spec.visual.quality.numslices, spec.visual.quality.numstacks = 8, 6
+    spec.visual.headlight.ambient = (0.45, 0.45, 0.45)
+    spec.visual.headlight.diffuse = (0.45, 0.45, 0.45)
+    spec.visual.headlight.specular = (0.1, 0.1, 0.1)
+    spec.worldbody.add_light(
+        pos=(0.5, -1.0, 3.0), dir=(0.0, 0.3, -1.0), diffuse=(0.35, 0.35, 0.35),
+        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, castshadow=False,  # it halves the time
+    )  # fmt: skip
+    spec.add_texture(
+        name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, width=64, height=64,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT, rgb1=(1, 1, 1), rgb2=(0.92, 0.94, 0.97),
+    )  # fmt: skip
+    spec.add_material(name="floor", rgba=(0.9, 0.92, 0.94, 1.0), emission=0.25)
+    spec.worldbody.add_geom(
+        name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=(3.0, 3.0, 0.1),
+        group=_DRAWN_ONLY, contype=0, conaffinity=0, material="floor",
+    )  # fmt: skip
+
+
+def _draw(scene: Any, mark: Spheres | Arrow) -> None:
+    """Appends a mark to what will be drawn, as far as the scene has room."""
+    color = np.array(mark.color, np.float32)
+    if isinstance(mark, Spheres):
+        kind, size = mujoco.mjtGeom.mjGEOM_SPHERE, np.full(3, mark.radius)
+        upright = np.eye(3).ravel()
+        for center in mark.centers_W[: scene.maxgeom - scene.ngeom]:
+            mujoco.mjv_initGeom(scene.geoms[scene.ngeom], kind, size, center, upright, color)
+            scene.ngeom += 1
+    elif scene.ngeom < scene.maxgeom and np.any(mark.tip_W != mark.tail_W):
+        kind = mujoco.mjtGeom.mjGEOM_ARROW
+        geom = scene.geoms[scene.ngeom]
+        mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.zeros(9), color)
+        mujoco.mjv_connector(geom, kind, mark.width, mark.tail_W, mark.tip_W)
+        scene.ngeom += 1
