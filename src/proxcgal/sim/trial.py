@@ -1,0 +1,111 @@
+"""One run, one way through: source -> injected faults -> tick -> recorder."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable
+
+import numpy as np
+
+from proxcgal import _core
+from proxcgal.models import Robot
+from proxcgal.sim.faults import FaultInjector
+from proxcgal.sim.loop import run_ticks
+from proxcgal.sim.recorder import Recorder, Settings
+from proxcgal.sim.replay import first_difference, recompute
+from proxcgal.sim.scenario import CONTROLLERS, Scenario
+from proxcgal.sim.setup import Setup
+from proxcgal.sim.source import SimulatedSource
+from proxcgal.sim.ticks import Tick, TickTruth
+from proxcgal.sim.trial_log import TrialLog
+from proxcgal.sim.truth import Truth
+from proxcgal.sim.world import World
+
+__all__ = ["CONTROLLERS", "TrialLog", "first_difference", "recompute", "run_trial"]
+
+Progress = Callable[[float], None]
+
+
+def run_trial(
+    scenario: Scenario,
+    controller: str,
+    *,
+    seed: int | None = None,
+    robot: Robot | None = None,
+    recorder: Recorder | None = None,
+    on_progress: Progress | None = None,
+) -> TrialLog:
+    """Simulates a scenario with one controller.
+
+    Args:
+        scenario: what to run.
+        controller: one of CONTROLLERS.
+        seed: instead of the scenario's.
+        robot: the scenario's, where it is loaded already.
+        recorder: gets every tick; the caller closes it.
+        on_progress: told the share that is done, 0 to 1, once each tenth of a simulated second.
+
+    Raises:
+        ConfigError: what of the scenario does not fit.
+        SimulationError: the simulator warned.
+    """
+    begin = clock.perf_counter()
+    seed = scenario.seed if seed is None else seed
+    setup = Setup.of(scenario, robot)
+    known = setup.known_points() if setup.uses_known_points(controller) else None
+    law = setup.make_controller(controller, 0 if known is None else len(known))
+    faults = FaultInjector(scenario.faults, [mount.name for mount in setup.skin.mounts], seed)
+    world = World(setup.robot, scenario.obstacles) if known is None else None
+    source = SimulatedSource(setup, world, seed)
+    truth = Truth(setup.robot, scenario.obstacles)
+    log = None
+    if recorder is not None:
+        recorder.start(
+            Settings(
+                scenario=scenario.model_copy(update={"seed": seed}), controller=controller,
+                seed=seed, meshes=setup.mesh_hashes(), known_points_W=known,
+            )
+        )  # fmt: skip
+        log = _Log(recorder, setup.robot, 1.0 / scenario.simulation.sensor_hz)
+    ticks: list[Tick] = []
+    beat = max(round(0.1 * scenario.simulation.control_hz), 1)
+    for given, result in run_ticks(source, law, faults, known):
+        distance, link, own = truth(given.q)
+        leaked = 0 if known is not None else _leaked(law, source)
+        ticks.append(Tick(given, result, TickTruth(distance, link, own, leaked)))
+        if log is not None:
+            log.write(ticks[-1], law)
+        if on_progress is not None and len(ticks) % beat == 0:
+            on_progress(min((given.time + law.config.period) / scenario.duration, 1.0))
+    if on_progress is not None:
+        on_progress(1.0)
+    return TrialLog.of(
+        ticks, setup.robot, scenario=scenario.name, controller=controller, seed=seed,
+        wall_s=clock.perf_counter() - begin,
+        recording_failure=recorder.failure if recorder else None,
+    )  # fmt: skip
+
+
+def _leaked(law: _core.Controller, source: SimulatedSource) -> int:
+    """How many points of the filtered cloud really are the robot itself."""
+    origins = np.asarray(law.cloud_origins())
+    return int(source.saw_robot[origins[:, 0], origins[:, 1]].sum())
+
+
+class _Log:
+    """What the recorder is told: every tick, and at the sensors' rate what Foxglove draws."""
+
+    def __init__(self, recorder: Recorder, robot: Robot, period: float) -> None:
+        self._recorder = recorder
+        self._robot = robot
+        self._period = period
+        self._next = -np.inf
+
+    def write(self, tick: Tick, law: _core.Controller) -> None:
+        if tick.given.time >= self._next:
+            self._next = tick.given.time + 0.999 * self._period
+            arrow = (tick.result.control_W, tick.result.obstacle_W)
+            poses = np.asarray(self._robot.link_poses(tick.given.q))
+            names = self._robot.link_names
+            self._recorder.show(tick.given.time, law.cloud_W(), names, poses, arrow)
+        self._recorder.write(tick)
