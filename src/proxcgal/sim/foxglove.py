@@ -128,7 +128,7 @@ def boxes(time: float, named: Sequence[tuple[str, Array, Sequence[float]]]) -> b
 
 
 def _entity(time: float, name: str, **primitives: Any) -> dict[str, Any]:
-    empty = {kind: [] for kind in ("arrows", "cubes", *_OTHER_PRIMITIVES)}
+    empty: dict[str, list[Any]] = {kind: [] for kind in ("arrows", "cubes", *_OTHER_PRIMITIVES)}
     return {
         "timestamp": _time(time), "frame_id": WORLD, "id": name, "frame_locked": False,
         "lifetime": {"sec": 0, "nsec": 0}, "metadata": [], **empty, **primitives,

@@ -6,17 +6,17 @@ the checksum of the whole file before it, so that damage is found, wherever it i
 
 from __future__ import annotations
 
-import hashlib
 import importlib.metadata
 import io
 import json
 import platform
+import warnings
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
-from typing import BinaryIO, Self
+from typing import IO, BinaryIO, Self, cast
 
 import numpy as np
 from mcap.writer import CompressionType, IndexType, Writer
@@ -46,13 +46,13 @@ class Settings:
     scenario: Scenario
     controller: str  #: one of CONTROLLERS
     seed: int
-    meshes: Mapping[str, str]  #: SHA-256 of each link's mesh: the controller's and "full" ones
+    meshes: Mapping[str, str]  #: SHA-256 of each link's two meshes
     versions: Mapping[str, str] = field(default_factory=lambda: versions())
     known_points_W: Array | None = field(default=None, compare=False)  #: where the run uses them
 
 
 class Recorder:
-    """Writes one run. A full disk stops the recording, never the run: see `failure`."""
+    """Writes one run. A full disk stops the recording, with a warning, but never the run."""
 
     def __init__(self, path: str | Path) -> None:
         """Opens the file at once, so that a bad place is told before anything is computed.
@@ -70,7 +70,7 @@ class Recorder:
             reason = error.strerror or error
             raise ConfigError(f"recording {self.path}: cannot be written: {reason}") from None
         self._writer = Writer(
-            self._stream, use_chunking=False, compression=CompressionType.NONE,
+            cast("IO[bytes]", self._stream), use_chunking=False, compression=CompressionType.NONE,
             index_types=IndexType.ALL, enable_data_crcs=True,
         )  # fmt: skip
         self._channels: dict[str, int] = {}
@@ -115,7 +115,7 @@ class Recorder:
         """Writes the index and closes the file; one that nothing was written to is removed."""
         try:
             if self.started and self.failure is None:
-                self._writer.finish()
+                self._writer.finish()  # type: ignore[no-untyped-call]
             self._stream.close()
         except OSError as error:
             self._fail(error)
@@ -166,19 +166,13 @@ class Recorder:
 
     def _fail(self, error: OSError) -> None:
         self.failure = f"recording {self.path} stopped: {error.strerror}"
+        warnings.warn(self.failure, RuntimeWarning, stacklevel=4)
 
 
 def settings_crc(content: Mapping[str, str]) -> str:
     """Checksum of the settings, which stand before any tick."""
     text = json.dumps({key: content[key] for key in sorted(content)})
     return str(zlib.crc32(text.encode()))
-
-
-def mesh_hash(vertices: Array, triangles: NDArray[np.integer]) -> str:
-    """SHA-256 of a mesh, the same on every machine."""
-    digest = hashlib.sha256(np.ascontiguousarray(vertices, "<f8").tobytes())
-    digest.update(np.ascontiguousarray(triangles, "<i4").tobytes())
-    return digest.hexdigest()
 
 
 def versions() -> dict[str, str]:

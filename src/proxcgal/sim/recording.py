@@ -17,6 +17,7 @@ from mcap.writer import MCAP0_MAGIC
 
 from proxcgal.errors import ConfigError, RecordingError
 from proxcgal.sim import packing
+from proxcgal.sim.foxglove import nanoseconds
 from proxcgal.sim.recorder import (
     FORMAT,
     KNOWN_POINTS,
@@ -86,6 +87,7 @@ class _Contents:
         self._settings: dict[str, str] | None = None
         self._known_points: Array | None = None
         self._ticks: list[Tick] = []
+        self._messages = 0
         self.damage: str | None = None
 
     def recording(self) -> Recording:
@@ -156,10 +158,16 @@ class _Contents:
                 self._known_points = np.load(io.BytesIO(attachment.data))
         elif opcode == Opcode.MESSAGE:
             message = Message.read(stream, len(content))
+            if message.sequence != self._messages:
+                raise ValueError(f"is message {message.sequence}, {self._messages} was expected")
+            self._messages += 1
             if self._topics[message.channel_id] == TICKS:
                 tick, before = packing.decode(message.data)
                 if before != crc:
                     raise ValueError("something between it and the tick before it was changed")
+                stamp = nanoseconds(tick.given.time)
+                if (message.log_time, message.publish_time) != (stamp, stamp):
+                    raise ValueError("its head was changed")
                 self._ticks.append(tick)
         elif opcode == Opcode.DATA_END:
             if DataEnd.read(stream).data_section_crc != crc:
