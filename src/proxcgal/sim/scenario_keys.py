@@ -87,6 +87,10 @@ class Ring(Section):
         min_length=1, description="one ring at each of these fractions of the link's length"
     )
     sensors: Count = Field(description="evenly round each ring")
+    phase: float = Field(0.0, description="[rad] turns each ring about the link's axis")
+    standoff: NonNegative | None = Field(
+        None, description="[m] height above the surface; left out: that of `px.ring_skin`"
+    )
 
 
 class Sensor(Section):
