@@ -51,7 +51,7 @@ void bind_robot(nanobind::module_& m) {
                                  qd_max,
                                  qdd_max};
           },
-          "name"_a, "type"_a = "revolute", "parent"_a = -1, "origin"_a, "axis"_a,
+          "name"_a, nb::kw_only(), "type"_a = "revolute", "parent"_a = -1, "origin"_a, "axis"_a,
           "q_min"_a = -kInfinity, "q_max"_a = kInfinity, "qd_max"_a = kInfinity,
           "qdd_max"_a = kInfinity)
       .def_ro("name", &JointSpec::name);

@@ -22,6 +22,8 @@ using namespace nb::literals;  // NOLINT(google-build-using-namespace): "name"_a
 
 using ArrayView = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
 
+inline std::string text_of(nb::handle value) { return nb::cast<std::string>(nb::str(value)); }
+
 /// How strictly an argument is taken.
 enum class Take {
   kConvert,  ///< set-up: whatever numpy can turn into float64, once
@@ -32,7 +34,7 @@ inline std::string shape_of(const ArrayView& array) {
   std::string text = "(";
   for (std::size_t i = 0; i < array.ndim(); ++i)
     text += (i > 0 ? ", " : "") + std::to_string(array.shape(i));
-  return text + ")";
+  return text + (array.ndim() == 1 ? ",)" : ")");
 }
 
 /// @throws GeometryError  naming the argument, what it is and what it must be
@@ -41,8 +43,8 @@ inline ArrayView array_from(nb::handle value, const char* name, const std::strin
   ArrayView view;
   if (nb::try_cast(value, view, false)) return view;
   const auto refuse = [&]() {
-    throw GeometryError(std::string(name) + " is " + nb::str(nb::repr(value.type())).c_str() +
-                        ", expected " + expected);
+    throw GeometryError(std::string(name) + " is " + text_of(value.type()) + ", expected " +
+                        expected);
   };
   if (take == Take::kExact) refuse();
   try {
@@ -108,14 +110,14 @@ inline Triangles triangles_from(nb::handle value) {
   const nb::object array = numpy.attr("asarray")(value);
   const std::string kind = nb::cast<std::string>(array.attr("dtype").attr("kind"));
   if (kind != "i" && kind != "u") {
-    throw GeometryError("triangles has type " + std::string(nb::str(array.attr("dtype")).c_str()) +
+    throw GeometryError("triangles has type " + text_of(array.attr("dtype")) +
                         ", expected integers of shape (f, 3)");
   }
   // By 64 bit, so that an index too large for 32 is told and not wrapped.
   nb::ndarray<const std::int64_t, nb::c_contig, nb::device::cpu> view;
   if (!nb::try_cast(numpy.attr("ascontiguousarray")(array, "dtype"_a = "int64"), view) ||
       view.ndim() != 2 || view.shape(1) != 3) {
-    throw GeometryError("triangles has shape " + std::string(nb::str(array.attr("shape")).c_str()) +
+    throw GeometryError("triangles has shape " + text_of(array.attr("shape")) +
                         ", expected (f, 3)");
   }
   Triangles triangles(static_cast<Eigen::Index>(view.shape(0)), 3);

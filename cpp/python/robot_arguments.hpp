@@ -9,7 +9,7 @@ inline int link_row(const Robot& robot, const nb::object& link) {
   if (nb::isinstance<nb::str>(link)) return robot.link_row(nb::cast<std::string>(link));
   int row = -1;
   if (nb::try_cast(link, row) && row >= 0 && row < robot.n_links()) return row;
-  return robot.link_row(nb::str(link).c_str());  // throws, with the names that exist
+  return robot.link_row(text_of(link));  // throws, with the names that exist
 }
 
 inline Posture posture_at(const Robot& robot, nb::handle q) {
