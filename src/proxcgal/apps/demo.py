@@ -49,8 +49,8 @@ def demo_command(options: DemoOptions, command: str) -> int:
         Plan(scenario=scenario, controllers=CONTROLLERS, folder=options.out / scenario.name)
         for scenario in scenarios
     ]
-    ready([options.out])
     made = origin(command)
+    ready([options.out])
     summaries = perform(plans, made, workers=workers, quiet=options.quiet)
     combine(options.out, summaries, made)
     return conclude(summaries, write_report(options.out))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -36,6 +37,7 @@ def _draw_pairs(scenario: Scenario, logs: Sequence[TrialLog], folder: Path) -> s
     """On the posture of the whole-body run at which it was nearest to what it saw."""
     from proxcgal.sim.setup import Setup
     from proxcgal.study.figures import png
+    from proxcgal.study.motion import bearing_for
     from proxcgal.study.pairs import pair_figure, sensor_view, whole_body_view
 
     setup = Setup.of(scenario)
@@ -54,12 +56,14 @@ def _draw_pairs(scenario: Scenario, logs: Sequence[TrialLog], folder: Path) -> s
     title = (
         f"{scenario.name}: closest pairs on one posture ({log.controller}, {log.time[tick]:.1f} s)"
     )
-    write_bytes(folder / "pairs.png", png(pair_figure([views], title=title)))
+    write_bytes(
+        folder / "pairs.png", png(pair_figure([views], title=title, bearing=bearing_for(setup)))
+    )
     return ", pairs.png"
 
 
 def draw_motion(scenario: Scenario, folder: Path, report: Report) -> str:
-    """Draws `motion.gif` from the folder's recordings; what was drawn, or why nothing was.
+    """Draws `motion.gif` and `motion.png` from the folder's recordings; what was drawn, or why not.
 
     A machine that cannot draw off screen still gets all its numbers and figures.
     """
@@ -70,13 +74,12 @@ def draw_motion(scenario: Scenario, folder: Path, report: Report) -> str:
     recordings = [read_recording(path) for path in files if path.is_file()]
     if not recordings:
         return f"{scenario.name}: no motion.gif: neither {' nor '.join(MOVING)} was run"
-    path = folder / "motion.gif"
-    half = path.with_name(".motion.gif")
+    names = ("motion.gif", "motion.png")
     try:
-        motion_picture(recordings, half, report)
-        half.replace(path)
+        with tempfile.TemporaryDirectory(prefix=".drawing-", dir=folder) as half:
+            motion_picture(recordings, *(Path(half) / name for name in names), report)
+            for name in names:
+                (Path(half) / name).replace(folder / name)
     except SimulationError as error:
         return f"{scenario.name}: no motion.gif: {error}"
-    finally:
-        half.unlink(missing_ok=True)
-    return f"{scenario.name}: motion.gif"
+    return f"{scenario.name}: {', '.join(names)}"

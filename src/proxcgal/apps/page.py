@@ -29,7 +29,9 @@ PICTURES = (
     ),
     (
         "motion.gif",
-        "The arm backing away. Points: the filtered cloud. Arrow: the closest pair.",
+        "The arm backing away. Red: the filtered cloud. Blue: points that were taken for the arm "
+        "itself and removed. Green: the pair that the avoidance acts on. The axes beyond the "
+        "obstacle: the goal.",
     ),
 )
 PAPER = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import tempfile
 import warnings
@@ -31,6 +32,7 @@ FILES = (
     "distance.png",
     "pairs.png",
     "motion.gif",
+    "motion.png",
 )
 
 
@@ -68,7 +70,7 @@ def perform(
         KeyboardInterrupt: with a message of what was kept.
     """
     trials = [(plan, name) for plan in plans for name in plan.controllers]
-    ready([plan.folder for plan in plans])
+    made = ready([plan.folder for plan in plans])
     try:
         with Pool(workers or default_workers(len(trials))) as pool:
             logs = _simulate(pool, trials, quiet)
@@ -87,6 +89,8 @@ def perform(
         kept = [str(path) for plan in plans for path in sorted(plan.folder.glob("*.mcap"))]
         text = "kept: " + ", ".join(kept) if kept else "nothing was kept"
         raise KeyboardInterrupt(text) from None
+    finally:
+        remove_empty(made)
     return summaries
 
 
@@ -111,8 +115,18 @@ def combine(folder: Path, summaries: Sequence[Summary], origin: dict[str, Any]) 
     write_json(folder / "summary.json", combined(summaries))
 
 
-def ready(folders: Sequence[Path]) -> None:
+def remove_empty(folders: Sequence[Path]) -> None:
+    """Removes those of the folders, innermost last, that nothing was written to."""
+    for path in reversed(folders):
+        with contextlib.suppress(OSError):
+            path.rmdir()
+
+
+def ready(folders: Sequence[Path]) -> list[Path]:
     """Makes the folders, shows that they can be written, removes an earlier run's files.
+
+    Returns:
+        The folders that were not there before, innermost last.
 
     Raises:
         ConfigError: a folder cannot be made or written; none is left behind that was not there.
@@ -127,14 +141,14 @@ def ready(folders: Sequence[Path]) -> None:
             with tempfile.TemporaryFile(dir=folder) as probe:
                 probe.write(b"proxcgal")
     except OSError as error:
-        for path in reversed(made):
-            path.rmdir()
+        remove_empty(made)
         raise ConfigError(f"--out {folder}: cannot be written: {error.strerror or error}") from None
     from proxcgal.sim.scenario import CONTROLLERS
 
     for folder in folders:
         for name in (*FILES, *(f"{controller}.mcap" for controller in CONTROLLERS)):
             (folder / name).unlink(missing_ok=True)
+    return made
 
 
 def _simulate(pool: Pool, trials: Sequence[tuple[Plan, str]], quiet: bool) -> list[TrialLog]:

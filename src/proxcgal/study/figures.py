@@ -47,7 +47,7 @@ def time_figure(logs: Sequence[TrialLog], *, title: str, d_min: float, buffer: f
     _activations(axes[1], logs)
     _links(axes[2], logs)
     axes[2].set_xlabel("time [s]", fontsize=10)
-    axes[2].set_xlim(0.0, max(float(log.time[-1]) for log in logs))
+    axes[2].set_xlim(0.0, max(_end(log) for log in logs))
     for ax in axes:
         ax.tick_params(labelsize=9)
         ax.spines[["top", "right"]].set_visible(False)
@@ -117,7 +117,7 @@ def _links(ax: Axes, logs: Sequence[TrialLog]) -> None:
     order: list[str] = []
     for log in logs:
         order += [link for link in dict.fromkeys(log.control_link) if link and link not in order]
-    duration = max(float(log.time[-1]) for log in logs)
+    duration = max(_end(log) for log in logs)
     told: set[str] = set()
     for row, log in enumerate(reversed(logs)):
         for link, start, end in _spans(log):
@@ -127,20 +127,25 @@ def _links(ax: Axes, logs: Sequence[TrialLog]) -> None:
                 ax.text((start + end) / 2, row, link, ha="center", va="center", fontsize=7.5)
                 told.add(link)
     rest = [link for link in order if link not in told]
-    if rest:
+    if rest and isinstance(ax.figure, Figure):
         colours = [BANDS[order.index(link) % len(BANDS)] for link in rest]
-        place: dict[str, Any] = {"loc": "upper right", "bbox_to_anchor": (1.0, -0.22), "ncols": 4}
-        ax.legend([Patch(color=colour) for colour in colours], rest, **place, **LEGEND)
+        patches = [Patch(color=colour) for colour in colours]
+        ax.figure.legend(patches, rest, loc="outside lower right", ncols=4, **LEGEND)
     ax.set_yticks(range(len(logs)), [log.controller for log in reversed(logs)])
     ax.set_ylim(-0.6, len(logs) - 0.4)
     ax.set_ylabel("control\npoint on", fontsize=10)
+
+
+def _end(log: TrialLog) -> float:
+    """When the last tick's command ends [s]."""
+    return float(log.time[-1] + (log.time[-1] - log.time[-2] if len(log.time) > 1 else 0.0))
 
 
 def _spans(log: TrialLog) -> Iterator[tuple[str, float, float]]:
     """(link, start, end) of every stretch of time with the same link, those with none left out."""
     links = np.asarray(log.control_link)
     starts = np.flatnonzero(np.r_[True, links[1:] != links[:-1]])
-    ends = np.r_[log.time[starts[1:]], log.time[-1]]
+    ends = np.r_[log.time[starts[1:]], _end(log)]
     for start, end in zip(starts, ends, strict=True):
         if links[start]:
             yield str(links[start]), float(log.time[start]), float(end)

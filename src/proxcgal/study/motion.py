@@ -17,8 +17,8 @@ from proxcgal.sim.world import Camera, World
 from proxcgal.study.figures import COLOURS, NAMES
 
 FPS = 10.0
-FRAMES = 80  # of the run; the last one is then held
-HELD = 12
+FRAMES = 60  # of the run; the last one is then held
+HELD = 10
 PANE = (400, 360)  # [px] width and height of one run's picture
 STRIP = 48  # [px] of text below it
 
@@ -26,6 +26,7 @@ STRIP = 48  # [px] of text below it
 def motion_picture(
     recordings: Sequence[Recording],
     path: Path,
+    still: Path,
     on_progress: Callable[[float], None] | None = None,
 ) -> None:
     """Writes a GIF of one scene under several controllers, side by side.
@@ -33,6 +34,7 @@ def motion_picture(
     Args:
         recordings: of one scenario; their ticks are repeated, which gives the clouds.
         path: where to.
+        still: where its last frame goes, as a PNG.
         on_progress: told the share done, 0 to 1.
 
     Raises:
@@ -55,26 +57,34 @@ def motion_picture(
                 on_progress((row + 1) / FRAMES)
     finally:
         world.close()
+    frames[-1].save(still, optimize=True)
     write_gif(frames + frames[-1:] * HELD, path, FPS)
 
 
 def camera_for(setup: Setup) -> Camera:
-    """Looks along the first obstacle's face, a little from the arm's side: it hides nothing."""
+    """A camera that has the arm and the first obstacle in view."""
     if not setup.scenario.obstacles:
         return Camera()
-    box = setup.scenario.obstacles[0]
     tool_W = np.asarray(setup.robot.tool_pose(setup.q0))[:3, 3]
-    obstacle_W = np.asarray(box.position)
-    normal_W = np.asarray(box.pose())[:3, int(np.argmin(box.size))]
-    away = normal_W if (tool_W - obstacle_W) @ normal_W > 0.0 else -normal_W
-    bearing = float(np.arctan2(away[1], away[0])) + np.deg2rad(68.0)  # of the camera, from above
-    middle = 0.5 * (tool_W + obstacle_W)
+    middle = 0.5 * (tool_W + np.asarray(setup.scenario.obstacles[0].position))
     return Camera(
         lookat_W=(0.6 * float(middle[0]), 0.6 * float(middle[1]), 0.42),
-        distance=2.15,
-        azimuth=bearing + float(np.pi),
+        distance=1.95,
+        azimuth=bearing_for(setup) + float(np.pi),  # of its line of sight
         elevation=float(np.deg2rad(-18.0)),
     )
+
+
+def bearing_for(setup: Setup) -> float:
+    """From where to look at the scene, counter-clockwise from x, seen from above [rad].
+
+    Along the first obstacle's face and a little from the arm's side, so that it hides nothing.
+    """
+    box = setup.scenario.obstacles[0]
+    tool_W = np.asarray(setup.robot.tool_pose(setup.q0))[:3, 3]
+    normal_W = np.asarray(box.pose())[:3, int(np.argmin(box.size))]
+    away = normal_W if (tool_W - np.asarray(box.position)) @ normal_W > 0.0 else -normal_W
+    return float(np.arctan2(away[1], away[0]) + np.deg2rad(78.0))
 
 
 def _pane(world: World, camera: Camera, snapshot: Snapshot, controller: str) -> Image.Image:

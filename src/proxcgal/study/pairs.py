@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 PAIR_COLOUR = "#C80000"
-ROBOT_POINTS = 4000  # that are drawn, at most
+ROBOT_SPACING = 0.018  # [m] about, between the points that stand for the arm
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,7 +28,7 @@ class PairView:
     """One controller's closest pair on one posture, as Fig. 3 shows it."""
 
     title: str
-    robot_W: Array  # (n, 3) [m] mesh vertices, or sensor mounting points
+    robot_W: Array  # (n, 3) [m] points of its meshes, or sensor mounting points
     context_W: Array  # (m, 3) [m] the rest of the arm, drawn faintly; may be empty
     obstacle_W: Array  # (k, 3) [m]
     control_W: Array  # (3,) [m] point of the robot
@@ -41,11 +41,18 @@ class PairView:
         return float(np.linalg.norm(self.control_W - self.nearest_W))
 
 
-def pair_figure(rows: Sequence[Sequence[PairView]], *, title: str) -> Figure:
+def pair_figure(
+    rows: Sequence[Sequence[PairView]], *, title: str, bearing: float = np.deg2rad(-62.0)
+) -> Figure:
     """Closest pairs side by side, a row a scene: the form of [WA] Fig. 3.
 
     The robot (or its sensors) as points, the obstacle in blue, a red arrow from the obstacle's
     point to the control point.
+
+    Args:
+        rows: scene by scene, the controllers' views.
+        title: above the figure.
+        bearing: from where it is looked at, counter-clockwise from x, seen from above [rad].
     """
     columns, height = len(rows[0]), 3.9 * len(rows) + 0.3
     figure = Figure(figsize=(3.8 * columns, height), dpi=DPI)
@@ -58,7 +65,7 @@ def pair_figure(rows: Sequence[Sequence[PairView]], *, title: str) -> Figure:
         everything = np.vstack([np.vstack((v.robot_W, v.context_W, v.obstacle_W)) for v in row])
         for j, view in enumerate(row):
             ax = figure.add_subplot(len(rows), columns, i * columns + j + 1, projection="3d")
-            _draw_pair(ax, view, everything)
+            _draw_pair(ax, view, everything, bearing)
             letter = "abcdefgh"[i * columns + j]
             text = f"{view.link}, {1000 * view.distance:.0f} mm"
             ax.text2D(
@@ -71,10 +78,10 @@ def pair_figure(rows: Sequence[Sequence[PairView]], *, title: str) -> Figure:
     return figure
 
 
-def _draw_pair(ax: Any, view: PairView, everything: Array) -> None:
+def _draw_pair(ax: Any, view: PairView, everything: Array, bearing: float) -> None:
     low, high = everything.min(axis=0), everything.max(axis=0)
     ax.set_proj_type("ortho")
-    ax.view_init(elev=20.0, azim=-62.0)
+    ax.view_init(elev=20.0, azim=np.rad2deg(bearing))
     ax.set_box_aspect(high - low, zoom=0.98)
     for setter, a, b in zip((ax.set_xlim, ax.set_ylim, ax.set_zlim), low, high, strict=True):
         setter(a, b)
@@ -109,7 +116,7 @@ def whole_body_view(
     """The pair that the whole-body controller acts on: Algorithm 2 on the control meshes.
 
     Args:
-        robot: its control meshes are drawn by their vertices.
+        robot: points on its control meshes stand for it in the picture.
         q: posture, (n_q,) [rad].
         points_W: the obstacle, (n, 3) [m].
         drawn_W: what of it is drawn, (m, 3) [m].
@@ -121,7 +128,7 @@ def whole_body_view(
     pair = _core.closest_pair(robot, q, points_W)
     return PairView(
         title=title,
-        robot_W=_thinned(vertices(robot, q), ROBOT_POINTS),
+        robot_W=surface_points(robot, q),
         context_W=np.zeros((0, 3)),
         obstacle_W=drawn_W,
         control_W=np.array(pair.surface_W),
@@ -144,7 +151,7 @@ def sensor_view(
     return PairView(
         title=title,
         robot_W=mounts_W,
-        context_W=_thinned(vertices(robot, q), ROBOT_POINTS),
+        context_W=surface_points(robot, q),
         obstacle_W=drawn_W,
         control_W=mounts_W[mount],
         nearest_W=np.array(points_W[point]),
@@ -152,18 +159,27 @@ def sensor_view(
     )
 
 
-def vertices(robot: Robot, q: Array) -> Array:
-    """Vertices of all control meshes in world, (n, 3) [m]."""
+def surface_points(robot: Robot, q: Array, spacing: float = ROBOT_SPACING) -> Array:
+    """Points spread evenly over all control meshes, in world, (n, 3) [m].
+
+    Not their vertices: a decimated tube has those at its ends only.
+
+    Args:
+        robot: whose meshes.
+        q: posture, (n_q,) [rad].
+        spacing: about as far from one another [m].
+    """
+    generator = np.random.default_rng(0)  # the same picture each time
     parts = []
     for name, T_WL in zip(robot.link_names, np.asarray(robot.link_poses(q)), strict=True):
-        vertices_L, _ = robot.mesh(name)
-        parts.append(np.asarray(vertices_L) @ T_WL[:3, :3].T + T_WL[:3, 3])
+        vertices_L, triangles = (np.asarray(part) for part in robot.mesh(name))
+        a, b, c = (vertices_L[triangles[:, corner]] for corner in range(3))
+        area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        count = max(1, round(float(area.sum()) / spacing**2))
+        at = generator.choice(len(area), count, p=area / area.sum())
+        u, v = generator.random((2, count, 1))
+        folded = u + v > 1.0
+        u, v = np.where(folded, 1.0 - u, u), np.where(folded, 1.0 - v, v)
+        points_L = a[at] + u * (b - a)[at] + v * (c - a)[at]
+        parts.append(points_L @ T_WL[:3, :3].T + T_WL[:3, 3])
     return np.vstack(parts)
-
-
-def _thinned(points: Array, most: int) -> Array:
-    """At most that many of the points, the same ones each time."""
-    if len(points) <= most:
-        return points
-    rows = np.random.default_rng(0).choice(len(points), most, replace=False)
-    return points[np.sort(rows)]

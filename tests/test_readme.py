@@ -1,0 +1,66 @@
+"""README: its Python runs as written, its commands exist."""
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from proxcgal.apps import cli
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text()
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", README, re.MULTILINE | re.DOTALL)
+
+
+def commands() -> list[str]:
+    lines = [
+        line.partition("#")[0].strip() for block in blocks("sh") for line in block.splitlines()
+    ]
+    return [line for line in lines if line]
+
+
+def test_the_python_blocks_run_in_their_order(tmp_path: Path) -> None:
+    code = "\n".join(blocks("python"))
+    assert code.count("px.") >= 5
+    done = subprocess.run(
+        [sys.executable, "-W", "error::DeprecationWarning", "-c", code],
+        cwd=tmp_path, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "true_min_m" in done.stdout
+
+
+@pytest.mark.parametrize("line", [c for c in commands() if c.startswith("proxcgal ")])
+def test_a_command_of_the_readme_parses(line: str) -> None:
+    _, command, *arguments = shlex.split(line)
+    assert cli.parse(command, arguments) is not None
+
+
+@pytest.mark.parametrize("line", [c for c in commands() if c.startswith("./run ")])
+def test_a_run_command_of_the_readme_exists(line: str) -> None:
+    usage = subprocess.run(
+        [ROOT / "run", "help"], capture_output=True, text=True, check=True
+    ).stdout
+    assert re.search(rf"^  {shlex.split(line)[1]}\b", usage, re.MULTILINE)
+
+
+def test_every_shell_command_is_checked_here() -> None:
+    rest = [c for c in commands() if not c.startswith(("proxcgal ", "./run "))]
+    assert rest == ["source .venv/bin/activate"]
+
+
+def test_every_file_that_the_readme_shows_or_links_is_there() -> None:
+    links = re.findall(r"\]\(([^)#]+)[^)]*\)", README)
+    assert links
+    assert [link for link in links if "://" not in link and not (ROOT / link).exists()] == []
+
+
+def test_the_commands_come_before_what_it_does_and_the_picture_before_them() -> None:
+    places = [README.index(text) for text in ("**Ranges", "![", "./run demo", "## What it does")]
+    assert places == sorted(places)
