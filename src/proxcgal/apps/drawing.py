@@ -77,7 +77,7 @@ def draw_motion(scenario: Scenario, folder: Path, report: Report) -> str:
     names = ("motion.gif", "motion.png")
     try:
         with tempfile.TemporaryDirectory(prefix=".drawing-", dir=folder) as half:
-            motion_picture(recordings, *(Path(half) / name for name in names), report)
+            motion_picture(recordings, Path(half) / names[0], Path(half) / names[1], report)
             for name in names:
                 (Path(half) / name).replace(folder / name)
     except SimulationError as error:

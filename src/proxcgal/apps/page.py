@@ -100,8 +100,9 @@ def _introduction(runs: Sequence[Run]) -> Iterator[str]:
 
 def _table(runs: Sequence[Run]) -> Iterator[str]:
     yield '<div class="scroll"><table><caption>True distances are exact meshes against the exact '
-    yield "scene; final is the mean of the last 2 s; a violation is a tick under 0.05 m; gain is wb "
-    yield "over sm. The paper gives curves and one number for all its experiments, no table.</caption>"
+    yield "scene; final is the mean of the last 2 s; a violation is a tick under 0.05 m; gain is "
+    yield "wb over sm. The paper gives curves and one number for all its experiments, no table."
+    yield "</caption>"
     yield '<thead><tr><th class="left">scene</th><th class="left">controller</th>'
     for name, unit in (
         ("true min", "m"),
