@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "control_points.hpp"
 #include "perception.hpp"
 #include "proxcgal/error.hpp"
 #include "stopwatch.hpp"
@@ -67,10 +68,8 @@ struct Controller::Impl {
   ControllerConfig config;
   Monitor monitor;
   detail::Perception perception;
+  detail::ControlPoints control_points;
   Limits limits;
-  std::vector<int> avoid_links;  // rows
-  std::vector<int> sensor_link;  // row of each sensor's link
-  std::vector<bool> sensor_moves;
 
   // The internal clock advances with the caller's, and goes on through its jumps.
   bool started = false;
@@ -78,9 +77,6 @@ struct Controller::Impl {
 
   JointVector qd_last;
   Posture posture;
-  std::vector<ClosestPair> per_link;
-  std::vector<int> candidates;
-  std::vector<ControlPair> controls;
   std::array<BuiltTask, kMaxLevels> built;
   std::array<Task, kMaxLevels> stack;
   Solution solution;
@@ -92,6 +88,7 @@ struct Controller::Impl {
         config(std::move(c)),
         monitor(config.monitor),
         perception(robot, skin, config.filter, config.method),
+        control_points(*robot, skin, config),
         limits{robot->q_min(), robot->q_max(), robot->qd_max(), robot->qdd_max()},
         posture(robot->make_posture()) {
     for (const TaskSpec& task : config.tasks) proxcgal::validate(task, *robot);
@@ -99,22 +96,8 @@ struct Controller::Impl {
       throw ConfigError("robot '" + robot->spec().name +
                         "' has a joint without a speed or acceleration limit: give both");
     }
-    for (int link = 0; link < robot->n_links(); ++link) {
-      if (config.avoid_links.empty() &&
-          robot->spec().links[static_cast<std::size_t>(link)].joint >= 0)
-        avoid_links.push_back(link);
-    }
-    for (const std::string& name : config.avoid_links) avoid_links.push_back(robot->link_row(name));
-    for (const Mount& mount : skin.mounts) {
-      sensor_link.push_back(robot->link_row(mount.link));
-      sensor_moves.push_back(
-          robot->spec().links[static_cast<std::size_t>(sensor_link.back())].joint >= 0);
-    }
     qd_last = JointVector::Zero(robot->n_q());
     out.qd = qd_last;
-    per_link.resize(avoid_links.size());
-    candidates.reserve(avoid_links.size());
-    controls.reserve(avoid_links.size());
     out.n_tasks = static_cast<int>(config.tasks.size());
     perception.timings = config.timings;
   }
@@ -150,68 +133,15 @@ struct Controller::Impl {
     return joints && rigid;
   }
 
-  ControlPair control_of(const ClosestPair& pair, const Vector3& velocity_W) const {
-    return {pair.link, pair.surface_W, pair.obstacle_W, velocity_W, pair.distance, Vector3::Zero()};
-  }
-
-  /// The nearest pair whose link joints can move away; what was passed over is noted.
-  std::optional<ClosestPair> drivable_pair(const PointsRef& cloud_W, double engaged_within) {
-    candidates.assign(avoid_links.begin(), avoid_links.end());
-    while (!candidates.empty()) {
-      const ClosestPair pair = closest_pair(*robot, posture, cloud_W, config.method, candidates);
-      if (!pair.found()) return std::nullopt;
-      if (row_norm(*robot, posture, control_of(pair, Vector3::Zero())) >= config.min_row_norm)
-        return pair;
-      note(Reason::kLinkSkipped, pair.link);
-      candidates.erase(std::find(candidates.begin(), candidates.end(), pair.link));
-      if (candidates.empty() && pair.distance < engaged_within)
-        note(Reason::kNoControllableLink, pair.link);
-    }
-    return std::nullopt;
-  }
-
-  /// SM baseline ([WA] ref. 31): the mounting point nearest to the cloud is what moves.
-  void control_sensor(const PointsRef& cloud_W, const Vector3& velocity_W) {
-    double nearest = kInfinity;
-    ControlPair control;
-    for (std::size_t s = 0; s < sensor_link.size(); ++s) {
-      if (!sensor_moves[s]) continue;
-      const Vector3 mount_W = posture.T_WL[static_cast<std::size_t>(sensor_link[s])] *
-                              skin.mounts[s].T_LS.translation();
-      for (Eigen::Index i = 0; i < cloud_W.rows(); ++i) {
-        const Vector3 point_W = cloud_W.row(i).transpose();
-        const double squared = (point_W - mount_W).squaredNorm();
-        if (!(squared < nearest)) continue;
-        nearest = squared;
-        control = {sensor_link[s], mount_W, point_W, velocity_W, 0.0, Vector3::Zero()};
-      }
-    }
-    if (control.link < 0) return;
-    control.distance = std::sqrt(nearest);
-    controls.push_back(control);
-  }
-
-  /// The k nearest links that joints can move away, one pair each.
-  void control_links(const PointsRef& cloud_W, int nearest, const Vector3& velocity_W) {
-    closest_pairs(*robot, posture, cloud_W, avoid_links, per_link);
-    std::sort(per_link.begin(), per_link.end(),
-              [](const auto& x, const auto& y) { return x.distance < y.distance; });
-    for (const ClosestPair& pair : per_link) {
-      if (static_cast<int>(controls.size()) == nearest || !pair.found()) return;
-      const ControlPair control = control_of(pair, velocity_W);
-      if (row_norm(*robot, posture, control) >= config.min_row_norm) controls.push_back(control);
-    }
-  }
-
   void build(const Avoidance& spec, const PointsRef& cloud_W, const Vector3& velocity_W,
              BuiltTask& task) {
-    controls.clear();
+    std::span<const ControlPair> controls;
     if (config.control_point == ControlPoint::kSensor) {
-      control_sensor(cloud_W, velocity_W);
+      controls = control_points.sensor(skin, posture, cloud_W, velocity_W);
     } else if (spec.nearest > 1) {
-      control_links(cloud_W, spec.nearest, velocity_W);
+      controls = control_points.links(*robot, posture, cloud_W, spec.nearest, velocity_W);
     } else if (out.pair) {
-      controls.push_back(control_of(*out.pair, velocity_W));
+      controls = control_points.one(*out.pair, velocity_W);
     }
     if (!controls.empty()) out.control = controls.front();
     build_avoidance(spec, *robot, posture, controls, task);
@@ -273,7 +203,7 @@ struct Controller::Impl {
            const Pose& goal) {
     detail::Stopwatch watch(config.timings);
     robot->update(q, posture);
-    out.pair = drivable_pair(cloud_W, engaged_within());
+    out.pair = control_points.nearest(*robot, posture, cloud_W, engaged_within(), monitor);
     out.timings.distance_us = watch.lap_us();
     build_stack(cloud_W, velocity_W, goal);
     const std::span<const Task> tasks(stack.data(), config.tasks.size());
@@ -362,7 +292,7 @@ std::span<const PointOrigin> Controller::cloud_origins() const {
 }
 Eigen::Map<const Points> Controller::raw_cloud_W() const { return impl_->perception.raw_cloud_W(); }
 std::vector<double> Controller::scan_ages(double time) const {
-  std::vector<double> ages(impl_->sensor_link.size());
+  std::vector<double> ages(impl_->skin.mounts.size());
   const double now = impl_->clock + (time - impl_->caller_time);
   for (std::size_t s = 0; s < ages.size(); ++s) ages[s] = impl_->perception.age(s, now);
   return ages;

@@ -1,0 +1,111 @@
+#include "control_points.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace proxcgal::detail {
+namespace {
+
+ControlPair control_of(const ClosestPair& pair, const Vector3& velocity_W) {
+  ControlPair control;
+  control.link = pair.link;
+  control.control_W = pair.surface_W;
+  control.obstacle_W = pair.obstacle_W;
+  control.obstacle_velocity_W = velocity_W;
+  control.distance = pair.distance;
+  return control;
+}
+
+void note(Monitor& monitor, Reason reason, int link) {
+  Finding finding;
+  finding.reason = reason;
+  finding.link = link;
+  monitor.add(finding);
+}
+
+}  // namespace
+
+ControlPoints::ControlPoints(const Robot& robot, const Skin& skin, const ControllerConfig& config)
+    : method_(config.method), min_row_norm_(config.min_row_norm) {
+  const auto moves = [&](int link) {
+    return robot.spec().links[static_cast<std::size_t>(link)].joint >= 0;
+  };
+  for (const std::string& name : config.avoid_links) links_.push_back(robot.link_row(name));
+  for (int link = 0; config.avoid_links.empty() && link < robot.n_links(); ++link) {
+    if (moves(link)) links_.push_back(link);
+  }
+  for (const Mount& mount : skin.mounts) {
+    const int link = robot.link_row(mount.link);
+    sensor_link_.push_back(moves(link) ? link : -1);
+  }
+  candidates_.reserve(links_.size());
+  per_link_.resize(links_.size());
+  chosen_.reserve(std::max<std::size_t>(links_.size(), 1));
+}
+
+std::optional<ClosestPair> ControlPoints::nearest(const Robot& robot, const Posture& posture,
+                                                  const PointsRef& cloud_W, double engaged_within,
+                                                  Monitor& monitor) {
+  candidates_.assign(links_.begin(), links_.end());
+  while (!candidates_.empty()) {
+    const ClosestPair pair = closest_pair(robot, posture, cloud_W, method_, candidates_);
+    if (!pair.found()) return std::nullopt;
+    if (row_norm(robot, posture, control_of(pair, Vector3::Zero())) >= min_row_norm_) return pair;
+    note(monitor, Reason::kLinkSkipped, pair.link);
+    candidates_.erase(std::find(candidates_.begin(), candidates_.end(), pair.link));
+    if (candidates_.empty() && pair.distance < engaged_within) {
+      note(monitor, Reason::kNoControllableLink, pair.link);
+    }
+  }
+  return std::nullopt;
+}
+
+std::span<const ControlPair> ControlPoints::sensor(const Skin& skin, const Posture& posture,
+                                                   const PointsRef& cloud_W,
+                                                   const Vector3& velocity_W) {
+  chosen_.clear();
+  ControlPair control;
+  double nearest = kInfinity;
+  for (std::size_t s = 0; s < sensor_link_.size(); ++s) {
+    if (sensor_link_[s] < 0) continue;
+    const Pose& T_WL = posture.T_WL[static_cast<std::size_t>(sensor_link_[s])];
+    const Vector3 mount_W = T_WL * skin.mounts[s].T_LS.translation();
+    for (Eigen::Index i = 0; i < cloud_W.rows(); ++i) {
+      const Vector3 point_W = cloud_W.row(i).transpose();
+      const double squared = (point_W - mount_W).squaredNorm();
+      if (!(squared < nearest)) continue;
+      nearest = squared;
+      control.link = sensor_link_[s];
+      control.control_W = mount_W;
+      control.obstacle_W = point_W;
+    }
+  }
+  control.obstacle_velocity_W = velocity_W;
+  control.distance = std::sqrt(nearest);
+  if (control.link >= 0) chosen_.push_back(control);
+  return chosen_;
+}
+
+std::span<const ControlPair> ControlPoints::links(const Robot& robot, const Posture& posture,
+                                                  const PointsRef& cloud_W, int count,
+                                                  const Vector3& velocity_W) {
+  chosen_.clear();
+  closest_pairs(robot, posture, cloud_W, links_, per_link_);
+  std::sort(per_link_.begin(), per_link_.end(),
+            [](const auto& x, const auto& y) { return x.distance < y.distance; });
+  for (const ClosestPair& pair : per_link_) {
+    if (static_cast<int>(chosen_.size()) == count || !pair.found()) break;
+    const ControlPair control = control_of(pair, velocity_W);
+    if (row_norm(robot, posture, control) >= min_row_norm_) chosen_.push_back(control);
+  }
+  return chosen_;
+}
+
+std::span<const ControlPair> ControlPoints::one(const ClosestPair& pair,
+                                                const Vector3& velocity_W) {
+  chosen_.clear();
+  chosen_.push_back(control_of(pair, velocity_W));
+  return chosen_;
+}
+
+}  // namespace proxcgal::detail
