@@ -12,7 +12,6 @@ from pydantic import Field, ValidationError
 from proxcgal.errors import ConfigError
 from proxcgal.sim import toml
 from proxcgal.sim.scenario_keys import (
-    Controller,
     Fault,
     Goal,
     Limits,
@@ -22,6 +21,7 @@ from proxcgal.sim.scenario_keys import (
     Simulation,
     Skin,
 )
+from proxcgal.sim.scenario_law import Controller
 from proxcgal.sim.scenario_problems import lines
 
 #: wb: whole body; sm: sensor points; wb_known: whole body on points of the scene itself.

@@ -1,6 +1,7 @@
 """The keys of a scenario file: their types, bounds, units and defaults.
 
-SI units and radians; a default that the C++ core has is taken from there, never repeated.
+SI units and radians; a default that the C++ core has is taken from there, never repeated. Those of
+the control law stand in `scenario_law`.
 """
 
 from __future__ import annotations
@@ -15,7 +16,6 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 from proxcgal import _core
 from proxcgal.sim import boxes
 
-TaskName = Literal["avoidance", "reach", "joint_limits", "minimum_altitude", "manipulability"]
 FaultKind = Literal[
     "silent", "frozen", "stuck_payload", "nan", "zero", "dropout", "offset", "delay"
 ]
@@ -43,7 +43,7 @@ Size = Annotated[tuple[Positive, ...], Field(min_length=3, max_length=3)]
 Bound = Annotated[float, Field(allow_inf_nan=True), AfterValidator(_not_nan)]
 
 
-def _like(struct: str, attribute: str, description: str) -> Any:
+def like(struct: str, attribute: str, description: str) -> Any:
     """A field whose default is that of the core's struct."""
 
     def default() -> Any:
@@ -88,6 +88,9 @@ class Ring(Section):
     )
     sensors: Count = Field(description="evenly round each ring")
     phase: float = Field(0.0, description="[rad] turns each ring about the link's axis")
+    axis: Literal["x", "y", "z"] | None = Field(
+        None, description="of the link's frame, for rings round another than its longest side"
+    )
     standoff: NonNegative | None = Field(
         None, description="[m] height above the surface; left out: that of `px.ring_skin`"
     )
@@ -96,21 +99,21 @@ class Ring(Section):
 class Sensor(Section):
     """What the controller takes a sensor for (VL53L8CX)."""
 
-    field_of_view: Annotated[float, Field(gt=0, lt=math.pi)] = _like(
+    field_of_view: Annotated[float, Field(gt=0, lt=math.pi)] = like(
         "SensorModel", "field_of_view", "[rad] along one side of the 8 x 8 zones"
     )
-    min_range: NonNegative = _like("SensorModel", "min_range", "[m] along the sensor's z axis")
-    max_range: Positive = _like("SensorModel", "max_range", "[m] along the sensor's z axis")
-    workspace: Positive = _like(
+    min_range: NonNegative = like("SensorModel", "min_range", "[m] along the sensor's z axis")
+    max_range: Positive = like("SensorModel", "max_range", "[m] along the sensor's z axis")
+    workspace: Positive = like(
         "SensorModel", "workspace", "[m] along the ray; farther points are cropped"
     )
-    sigma_floor: NonNegative = _like(
+    sigma_floor: NonNegative = like(
         "SensorModel", "sigma_floor", "[m] least standard deviation the filter reckons with"
     )
-    sigma_ratio: NonNegative = _like(
+    sigma_ratio: NonNegative = like(
         "SensorModel", "sigma_ratio", "of the range, where that is more than the floor"
     )
-    range_model: Literal["tangent", "printed"] = _like(
+    range_model: Literal["tangent", "printed"] = like(
         "SensorModel", "range_model", "form of [WA] eq. (1)"
     )
 
@@ -122,116 +125,6 @@ class Skin(Section):
     sensor: Sensor = Field(default_factory=Sensor)
 
 
-class Filter(Section):
-    """Body removal."""
-
-    tolerance: NonNegative = _like("FilterConfig", "tolerance", "[m] epsilon of Algorithm 1")
-    sigmas: NonNegative = _like(
-        "FilterConfig", "sigmas", "the tolerance is at least this many sigma(range)"
-    )
-    min_hit: NonNegative = _like(
-        "FilterConfig", "min_hit", "[m] nearer hits are the sensor's own mounting"
-    )
-    surface_margin: bool = _like(
-        "FilterConfig", "surface_margin", "also drop what lies that near to any link"
-    )
-    confirmation: Literal["off", "zones", "scans"] = _like(
-        "FilterConfig", "confirmation", "believe a point only when seen twice"
-    )
-    z_min: Bound = _like("FilterConfig", "z_min", "[m] points below are cropped (floor)")
-
-
-class Solver(Section):
-    """The task-priority solver."""
-
-    damping: NonNegative = _like("SolverConfig", "damping", "lambda")
-    damping_threshold: NonNegative = _like(
-        "SolverConfig", "damping_threshold", "s_th; singular values below are damped"
-    )
-    eta: NonNegative = _like("SolverConfig", "eta", "cost of leaving the upper levels' freedom")
-    form: Literal["literal", "code"] = _like("SolverConfig", "form", "of the damped inverse")
-
-
-class Monitor(Section):
-    """Freshness bounds."""
-
-    degraded_after: Positive = _like(
-        "MonitorConfig", "degraded_after", "[s] age of one sensor's scan that slows the arm"
-    )
-    hold_after: Positive = _like(
-        "MonitorConfig", "hold_after", "[s] age of all sensors' scans that holds the arm"
-    )
-    degraded_scale: Share = _like(
-        "MonitorConfig", "degraded_scale", "of the speed limits while degraded"
-    )
-    clean_cycles: Count = _like(
-        "MonitorConfig", "clean_cycles", "cycles without a cause before a mode clears"
-    )
-    missed_deadlines: Count = _like(
-        "MonitorConfig", "missed_deadlines", "in a row, before the arm holds"
-    )
-
-
-class JointLimits(Section):
-    """Task `joint_limits`."""
-
-    gain: Positive = _like("JointLimits", "gain", "[1/s] towards the middle")
-    margin: Positive = _like("JointLimits", "margin", "[rad] or [m] where it begins to act")
-
-
-class MinimumAltitude(Section):
-    """Task `minimum_altitude`."""
-
-    height: float = _like("MinimumAltitude", "height", "[m] the tool is to stay above")
-    buffer: Positive = _like("MinimumAltitude", "buffer", "[m] above it, where it begins to act")
-    gain: Positive = _like("MinimumAltitude", "gain", "[1/s]")
-
-
-class Manipulability(Section):
-    """Task `manipulability`."""
-
-    target: Positive = _like("Manipulability", "target", "the rate pulls towards it")
-    low: Positive = _like("Manipulability", "low", "fully active below")
-    high: Positive = _like("Manipulability", "high", "inactive above")
-    gain: Positive = _like("Manipulability", "gain", "[1/s]")
-
-
-class Controller(Section):
-    """The control law, the same for the whole body and for the sensor points."""
-
-    d_min: Positive = _like("Avoidance", "d_min", "[m] distance to keep")
-    buffer: Positive = _like("Avoidance", "buffer", "[m] Delta: avoidance fades in over it")
-    avoid_gain: Positive = _like("Avoidance", "gain", "[1/s] lambda of avoidance")
-    nearest: Count = _like("Avoidance", "nearest", "this many nearest links, one row each")
-    reach_gain: Positive = _like("Reach", "gain", "[1/s] lambda of reaching")
-    max_linear: Positive = _like("Reach", "max_linear", "[m/s] of reaching")
-    max_angular: Positive = _like("Reach", "max_angular", "[rad/s] of reaching")
-    tasks: tuple[TaskName, ...] = Field(
-        ("avoidance", "reach"), min_length=1, description="their order is their priority"
-    )
-    min_row_norm: NonNegative = _like(
-        "ControllerConfig", "min_row_norm", "a link that joints move less than this is passed over"
-    )
-    avoid_links: tuple[str, ...] = _like(
-        "ControllerConfig", "avoid_links", "links to keep away; empty: all that some joint moves"
-    )
-    method: Literal["fast", "paper"] = _like(
-        "ControllerConfig", "method", "accelerated or literal, with the same answer"
-    )
-    filter: Filter = Field(default_factory=Filter)
-    solver: Solver = Field(default_factory=Solver)
-    monitor: Monitor = Field(default_factory=Monitor)
-    joint_limits: JointLimits = Field(default_factory=JointLimits)
-    minimum_altitude: MinimumAltitude = Field(default_factory=MinimumAltitude)
-    manipulability: Manipulability = Field(default_factory=Manipulability)
-
-    @model_validator(mode="after")
-    def _each_task_once(self) -> Self:
-        if len(set(self.tasks)) < len(self.tasks):
-            raise ValueError("tasks names one of them twice")
-        return self
-
-
 class Simulation(Section):
     """Rates, and what the simulated sensors really do."""
 
@@ -241,8 +134,8 @@ class Simulation(Section):
     sub_rays: Literal[1, 4, 9, 16] = Field(
         1, description="rays cast in each zone, of which the nearest counts"
     )
-    sigma_floor: NonNegative = _like("SensorModel", "sigma_floor", "[m] least noise of a range")
-    sigma_ratio: NonNegative = _like(
+    sigma_floor: NonNegative = like("SensorModel", "sigma_floor", "[m] least noise of a range")
+    sigma_ratio: NonNegative = like(
         "SensorModel", "sigma_ratio", "noise as a share of the range, where that is more"
     )
     bias: float = Field(0.0, description="[m] added to every range")

@@ -13,7 +13,8 @@ from proxcgal.errors import ConfigError
 from proxcgal.models import Robot, load_robot, ring_skin
 from proxcgal.sim import boxes
 from proxcgal.sim.scenario import CONTROLLERS, Scenario
-from proxcgal.sim.scenario_keys import Controller, Section
+from proxcgal.sim.scenario_keys import Section
+from proxcgal.sim.scenario_law import Controller
 
 Array = NDArray[np.float64]
 
@@ -105,10 +106,11 @@ def make_skin(scenario: Scenario, robot: Robot) -> _core.Skin:
         raise ConfigError("\n".join(f"scenario {scenario.name}: {line}" for line in unknown))
     skin = _core.Skin([], model)
     for ring in scenario.skin.rings:
-        height = {} if ring.standoff is None else {"standoff": ring.standoff}
+        height: dict[str, Any] = {} if ring.standoff is None else {"standoff": ring.standoff}
         skin = skin + ring_skin(
-            robot, ring.link, ring.at, ring.sensors, model=model, phase=ring.phase, **height
-        )
+            robot, ring.link, ring.at, ring.sensors, model=model, phase=ring.phase,
+            axis=ring.axis, **height,
+        )  # fmt: skip
     return skin
 
 

@@ -1,0 +1,129 @@
+"""The keys of a scenario's `[controller]`: tasks, filter, solver, monitor."""
+
+from __future__ import annotations
+
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from proxcgal.sim.scenario_keys import (
+    Bound,
+    Count,
+    NonNegative,
+    Positive,
+    Section,
+    Share,
+    like,
+)
+
+TaskName = Literal["avoidance", "reach", "joint_limits", "minimum_altitude", "manipulability"]
+
+
+class Filter(Section):
+    """Body removal."""
+
+    tolerance: NonNegative = like("FilterConfig", "tolerance", "[m] epsilon of Algorithm 1")
+    sigmas: NonNegative = like(
+        "FilterConfig", "sigmas", "the tolerance is at least this many sigma(range)"
+    )
+    min_hit: NonNegative = like(
+        "FilterConfig", "min_hit", "[m] nearer hits are the sensor's own mounting"
+    )
+    surface_margin: bool = like(
+        "FilterConfig", "surface_margin", "also drop what lies that near to any link"
+    )
+    confirmation: Literal["off", "zones", "scans"] = like(
+        "FilterConfig", "confirmation", "believe a point only when seen twice"
+    )
+    z_min: Bound = like("FilterConfig", "z_min", "[m] points below are cropped (floor)")
+
+
+class Solver(Section):
+    """The task-priority solver."""
+
+    damping: NonNegative = like("SolverConfig", "damping", "lambda")
+    damping_threshold: NonNegative = like(
+        "SolverConfig", "damping_threshold", "s_th; singular values below are damped"
+    )
+    eta: NonNegative = like("SolverConfig", "eta", "cost of leaving the upper levels' freedom")
+    form: Literal["literal", "code"] = like("SolverConfig", "form", "of the damped inverse")
+
+
+class Monitor(Section):
+    """Freshness bounds."""
+
+    degraded_after: Positive = like(
+        "MonitorConfig", "degraded_after", "[s] age of one sensor's scan that slows the arm"
+    )
+    hold_after: Positive = like(
+        "MonitorConfig", "hold_after", "[s] age of all sensors' scans that holds the arm"
+    )
+    degraded_scale: Share = like(
+        "MonitorConfig", "degraded_scale", "of the speed limits while degraded"
+    )
+    clean_cycles: Count = like(
+        "MonitorConfig", "clean_cycles", "cycles without a cause before a mode clears"
+    )
+    missed_deadlines: Count = like(
+        "MonitorConfig", "missed_deadlines", "in a row, before the arm holds"
+    )
+
+
+class JointLimits(Section):
+    """Task `joint_limits`."""
+
+    gain: Positive = like("JointLimits", "gain", "[1/s] towards the middle")
+    margin: Positive = like("JointLimits", "margin", "[rad] or [m] where it begins to act")
+
+
+class MinimumAltitude(Section):
+    """Task `minimum_altitude`."""
+
+    height: float = like("MinimumAltitude", "height", "[m] the tool is to stay above")
+    buffer: Positive = like("MinimumAltitude", "buffer", "[m] above it, where it begins to act")
+    gain: Positive = like("MinimumAltitude", "gain", "[1/s]")
+
+
+class Manipulability(Section):
+    """Task `manipulability`."""
+
+    target: Positive = like("Manipulability", "target", "the rate pulls towards it")
+    low: Positive = like("Manipulability", "low", "fully active below")
+    high: Positive = like("Manipulability", "high", "inactive above")
+    gain: Positive = like("Manipulability", "gain", "[1/s]")
+
+
+class Controller(Section):
+    """The control law, the same for the whole body and for the sensor points."""
+
+    d_min: Positive = like("Avoidance", "d_min", "[m] distance to keep")
+    buffer: Positive = like("Avoidance", "buffer", "[m] Delta: avoidance fades in over it")
+    avoid_gain: Positive = like("Avoidance", "gain", "[1/s] lambda of avoidance")
+    nearest: Count = like("Avoidance", "nearest", "this many nearest links, one row each")
+    reach_gain: Positive = like("Reach", "gain", "[1/s] lambda of reaching")
+    max_linear: Positive = like("Reach", "max_linear", "[m/s] of reaching")
+    max_angular: Positive = like("Reach", "max_angular", "[rad/s] of reaching")
+    tasks: tuple[TaskName, ...] = Field(
+        ("avoidance", "reach"), min_length=1, description="their order is their priority"
+    )
+    min_row_norm: NonNegative = like(
+        "ControllerConfig", "min_row_norm", "a link that joints move less than this is passed over"
+    )
+    avoid_links: tuple[str, ...] = like(
+        "ControllerConfig", "avoid_links", "links to keep away; empty: all that some joint moves"
+    )
+    method: Literal["fast", "paper"] = like(
+        "ControllerConfig", "method", "accelerated or literal, with the same answer"
+    )
+    filter: Filter = Field(default_factory=Filter)
+    solver: Solver = Field(default_factory=Solver)
+    monitor: Monitor = Field(default_factory=Monitor)
+    joint_limits: JointLimits = Field(default_factory=JointLimits)
+    minimum_altitude: MinimumAltitude = Field(default_factory=MinimumAltitude)
+    manipulability: Manipulability = Field(default_factory=Manipulability)
+
+    @model_validator(mode="after")
+    def _each_task_once(self) -> Self:
+        if len(set(self.tasks)) < len(self.tasks):
+            raise ValueError("tasks names one of them twice")
+        return self
