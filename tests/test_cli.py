@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -13,9 +14,14 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from PIL import Image
 
+import proxcgal as px
 from proxcgal.apps import cli
+from proxcgal.apps.drawing import draw_motion
 from proxcgal.sim.recording import read_recording
+from proxcgal.sim.scenario import load_scenario
+from proxcgal.study import motion
 
 QUICK = ["--set", "duration=0.4", "--quiet"]
 PROGRAM = [sys.executable, "-c", "import sys; from proxcgal.apps.cli import main; sys.exit(main())"]
@@ -267,6 +273,52 @@ def test_ctrl_c_ends_with_130_and_keeps_what_was_recorded(tmp_path: Path) -> Non
         assert recording.damage is None
         assert len(recording.ticks) > 10
     assert {path.name for path in (tmp_path / "here").iterdir()} == {"wb.mcap", "sm.mcap"}
+
+
+def test_the_demo_runs_both_scenes_and_ends_with_the_path_of_its_report(call: Call) -> None:
+    answer = call("demo", "--out", "out", "--set", "duration=0.2", "--no-picture", "--quiet")
+    assert answer.code == 0
+    assert answer.out.splitlines()[-1] == "out/report.html"
+    whole = json.loads(Path("out/summary.json").read_text())
+    assert list(whole["scenarios"]) == ["front_plane", "side_plane"]
+    for name, summary in whole["scenarios"].items():
+        assert summary == json.loads(Path("out", name, "summary.json").read_text())
+        assert list(summary["controllers"]) == ["wb", "sm", "wb_known"]
+        for file in ("distance.png", "pairs.png", "wb.mcap", "sm.mcap", "wb_known.mcap"):
+            assert Path("out", name, file).is_file()
+    assert Path("out/report.html").read_text().count("<img ") == 4
+
+
+def test_the_moving_picture_shows_both_controllers(
+    results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(motion, "FRAMES", 3)
+    monkeypatch.setattr(motion, "HELD", 0)
+    for name in ("wb.mcap", "sm.mcap"):
+        shutil.copy(results / name, tmp_path)
+    scenario = load_scenario("front_plane")
+    told = draw_motion(scenario, tmp_path, lambda _: None)
+    if "cannot draw off screen" in told:
+        pytest.skip(told)
+    with Image.open(tmp_path / "motion.gif") as picture:
+        assert getattr(picture, "n_frames", 1) == 3
+        assert picture.size == (2 * motion.PANE[0], motion.PANE[1] + motion.STRIP)
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "wb.mcap", "sm.mcap", "motion.gif", "motion.png",
+    }  # fmt: skip
+
+
+def test_without_a_way_to_draw_a_run_keeps_its_numbers(
+    results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise px.SimulationError("cannot draw off screen")
+
+    monkeypatch.setattr(motion, "draw", refuse)
+    shutil.copy(results / "wb.mcap", tmp_path)
+    told = draw_motion(load_scenario("front_plane"), tmp_path, lambda _: None)
+    assert told == "front_plane: no motion.gif: cannot draw off screen"
+    assert [path.name for path in tmp_path.iterdir()] == ["wb.mcap"]
 
 
 # --- Replay

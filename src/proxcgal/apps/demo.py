@@ -9,7 +9,7 @@ from typing import Annotated
 
 import tyro
 
-from proxcgal.apps.options import Flag, Number, checked_workers
+from proxcgal.apps.options import Flag, Number, Settings, checked_workers, flat
 
 SCENARIOS = ("front_plane", "side_plane")
 
@@ -29,6 +29,10 @@ class DemoOptions:
     """Fixes every random draw."""
     workers: Number = None
     """Processes that simulate; left out: one a processor."""
+    set: Settings = ()
+    """Change keys of both scenarios, values as in TOML: controller.d_min=0.25"""
+    no_picture: Flag = False
+    """Leave the moving pictures out."""
     quiet: Flag = False
     """No progress on stderr."""
 
@@ -42,7 +46,8 @@ def demo_command(options: DemoOptions, command: str) -> int:
     from proxcgal.sim.scenario import CONTROLLERS, load_scenario
 
     workers = checked_workers(options.workers)
-    scenarios = [load_scenario(name, [f"seed={options.seed}"]) for name in SCENARIOS]
+    changes = [f"seed={options.seed}", *flat(options.set)]
+    scenarios = [load_scenario(name, changes) for name in SCENARIOS]
     for scenario in scenarios:
         check(scenario, CONTROLLERS)
     plans = [
@@ -51,7 +56,9 @@ def demo_command(options: DemoOptions, command: str) -> int:
     ]
     made = origin(command)
     ready([options.out])
-    summaries = perform(plans, made, workers=workers, quiet=options.quiet)
+    summaries = perform(
+        plans, made, workers=workers, pictures=not options.no_picture, quiet=options.quiet
+    )
     combine(options.out, summaries, made)
     return conclude(summaries, write_report(options.out))
 
