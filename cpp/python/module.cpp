@@ -8,6 +8,8 @@ void bind_geometry(nb::module_& m);
 void bind_robot(nb::module_& m);
 void bind_pipeline(nb::module_& m);
 void bind_solve(nb::module_& m);
+void bind_task(nb::module_& m);
+void bind_command(nb::module_& m);
 void bind_config(nb::module_& m);
 void bind_controller(nb::module_& m);
 
@@ -42,6 +44,8 @@ NB_MODULE(_core, m) {
   bind_robot(m);
   bind_pipeline(m);
   bind_solve(m);
+  bind_task(m);
+  bind_command(m);
   bind_config(m);
   bind_controller(m);
 }
