@@ -8,8 +8,8 @@
 namespace proxcgal {
 namespace {
 
-/// Residuals nearer than this are equal [m/s] or [rad/s]: a task that has all but faded out must
-/// not rule the ones below it.
+/// Rates nearer than this are equal [m/s] or [rad/s]: a task that has all but faded out must not
+/// rule the ones below it.
 constexpr double kTie = 1e-6;
 
 /// The fastest a joint may go in this tick and still brake to rest within `room`.
@@ -61,13 +61,17 @@ JointVector towards(std::span<const JointVector> levels, std::size_t first, cons
   return qd;
 }
 
-/// Does `qd` serve the tasks better than `best`, the most important one first?
-bool serves_better(std::span<const Task> tasks, const JointVector& qd, const JointVector& best) {
+/// Is `qd` nearer than `best` to what `target` does for the tasks, the most important one first?
+///
+/// The target's own rates are the measure, not the reference rates: where a task is half active
+/// the solver has already weighed it against the lower ones.
+bool nearer(std::span<const Task> tasks, const JointVector& target, const JointVector& qd,
+            const JointVector& best) {
   for (const Task& task : tasks) {
-    const auto active_residual = [&](const JointVector& v) {
-      return task.activation.cwiseProduct(task.rate - task.jacobian * v).norm();
+    const auto missing = [&](const JointVector& v) {
+      return task.activation.cwiseProduct(task.jacobian * (target - v)).norm();
     };
-    const double gain = active_residual(best) - active_residual(qd);
+    const double gain = missing(best) - missing(qd);
     if (std::abs(gain) > kTie) return gain > 0.0;
   }
   return false;
@@ -107,7 +111,7 @@ void command(std::span<const JointVector> levels, std::span<const Task> tasks,
   out = towards(levels, target.level, target, anchor, box);
   for (std::size_t first = target.level; first-- > 0;) {
     const JointVector other = towards(levels, first, target, anchor, box);
-    if (serves_better(tasks, other, out)) out = other;
+    if (nearer(tasks, target.qd, other, out)) out = other;
   }
 }
 

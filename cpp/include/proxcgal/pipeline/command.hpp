@@ -38,9 +38,8 @@ Admissible admissible(const Limits& limits, const JointVector& q, const JointVec
 ///    lowest level is shrunk first, down to nothing, then the one above; at last the whole.
 /// 2. From the last command straight towards the target, as far as the acceleration limit allows.
 /// 3. The same towards the target without its lowest levels, to which they are then added, each as
-///    far as it fits. Of all these the command that leaves the most important task the smallest
-///    active residual |A (rate - J qd)| is taken; ties go to the next task, then to the fuller
-///    target.
+///    far as it fits. Of all these the command is taken that leaves the most important task the
+///    least of A J (target - qd); ties go to the next task, then to the fuller target.
 /// The last command is first brought into the box: that moves only joints that have to brake.
 /// @param levels   rho of (4.8) after each level, the closing one last; at least one
 /// @param tasks    one per level but the closing one
