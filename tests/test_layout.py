@@ -24,6 +24,7 @@ CPP_LAYER_OF = {
     "pipeline": "stages",
     "safety": "stages",
     "perception": "controller",
+    "control_points": "controller",
     "controller": "controller",
     "admittance": "controller",
     "python": "bindings",
