@@ -255,9 +255,9 @@ def test_staggered_sensors_take_turns(ur10e: px.Robot) -> None:
 
 def test_true_distance_never_exceeds_that_to_dense_samples_of_the_panel(ur10e: px.Robot) -> None:
     truth = Truth(ur10e, [PANEL])
-    points = boxes.points(PANEL.size, PANEL.pose(), 0.005)
+    points = boxes.points(PANEL.size, PANEL.pose(), 0.01)
     generator = np.random.default_rng(3)
-    for _ in range(5):
+    for _ in range(3):
         q = Q + generator.uniform(-0.3, 0.3, 6)
         distance, link, _ = truth(q)
         poses = dict(zip(ur10e.link_names, ur10e.link_poses(q), strict=True))
@@ -291,7 +291,7 @@ def test_own_distance_reaches_its_least_exactly(ur10e: px.Robot) -> None:
 
 def test_neighbours_and_links_built_close_together_do_not_count(ur10e: px.Robot) -> None:
     surfaces = Surfaces.of(ur10e)
-    pairs = set(surfaces.self_pairs)
+    pairs = {(a, b) for a, b in surfaces.self_pairs.tolist()}
     assert pairs
     assert not pairs & {(k, k + 1) for k in range(len(ur10e.link_names) - 1)}
     generator = np.random.default_rng(9)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from itertools import combinations
 from typing import TYPE_CHECKING, ClassVar
 from weakref import WeakKeyDictionary
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxcgal import _core
+from proxcgal.models.cache import Cache, Stored
 
 if TYPE_CHECKING:
     from proxcgal.models.robots import Robot
@@ -48,12 +50,20 @@ class Surfaces:
         ])  # fmt: skip
         #: Rows of the links that some joint moves.
         self.moving = [int(link) for link in np.flatnonzero(moves.any(axis=1))]
-        #: Pairs of links that are neither neighbours nor near in every posture.
-        self.self_pairs = [
-            pair
-            for pair in combinations(range(len(self.trees)), 2)
-            if self._joints_between(moves, *pair) > 1 and not self._always_near(*pair, poses)
-        ]
+        kept = Cache("self_pairs")
+        digest = hashlib.sha256(poses.tobytes()).hexdigest()
+        key = [ALWAYS_NEAR, digest, *(kinds["full"] for kinds in robot.mesh_hashes.values())]
+        entry = kept.get(key)
+        if entry is None:
+            pairs = [
+                pair
+                for pair in combinations(range(len(self.trees)), 2)
+                if self._joints_between(moves, *pair) > 1 and not self._always_near(*pair, poses)
+            ]
+            entry = Stored({"pairs": np.array(pairs, np.int64).reshape(-1, 2)}, {})
+            kept.put(key, entry)
+        #: (k, 2) pairs of links that are neither neighbours nor near in every posture.
+        self.self_pairs: NDArray[np.int64] = entry.arrays["pairs"]
 
     @classmethod
     def of(cls, robot: Robot) -> Surfaces:

@@ -87,7 +87,7 @@ class _OwnDistance:
 
     def __init__(self, surfaces: Surfaces) -> None:
         self._surfaces = surfaces
-        self._pairs = np.array(surfaces.self_pairs, np.intp).reshape(-1, 2)
+        self._pairs = surfaces.self_pairs
         self._at_least = np.zeros(len(self._pairs))
         self._last = np.full(len(self._pairs), np.inf)
         self._least = np.inf
