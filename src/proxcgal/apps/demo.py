@@ -49,7 +49,7 @@ def demo_command(options: DemoOptions, command: str) -> int:
     changes = [f"seed={options.seed}", *flat(options.set)]
     scenarios = [load_scenario(name, changes) for name in SCENARIOS]
     for scenario in scenarios:
-        check(scenario, CONTROLLERS)
+        check(scenario, CONTROLLERS, quiet=options.quiet)
     plans = [
         Plan(scenario=scenario, controllers=CONTROLLERS, folder=options.out / scenario.name)
         for scenario in scenarios

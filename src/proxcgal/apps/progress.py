@@ -58,3 +58,9 @@ class Progress:
         """One piece is done; its line is for logs, a bar shows it anyway."""
         if self._bar is None and not self._quiet:
             print(text, file=sys.stderr, flush=True)
+
+
+def announce(text: str, *, quiet: bool) -> None:
+    """Says on a terminal what is going on while there is nothing to count."""
+    if not quiet and sys.stderr.isatty():
+        print(text, file=sys.stderr, flush=True)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from proxcgal.apps.progress import Progress
+from proxcgal.apps.progress import Progress, announce
 from proxcgal.errors import ConfigError, ModelWarning
 from proxcgal.study.analysis import Summary, combined, static_summary, write_json, write_text
 from proxcgal.study.pool import Pool, Report, default_workers
@@ -94,8 +94,10 @@ def perform(
     return summaries
 
 
-def check(scenario: Scenario, controllers: Sequence[str]) -> None:
+def check(scenario: Scenario, controllers: Sequence[str], *, quiet: bool = False) -> None:
     """Sets everything up once, so that nothing is written where something does not fit.
+
+    A robot that is new to this machine has its meshes prepared here, and kept for the workers.
 
     Raises:
         ProxError: what of the scenario, the robot or the sensors cannot be.
@@ -103,6 +105,7 @@ def check(scenario: Scenario, controllers: Sequence[str]) -> None:
     from proxcgal.sim.faults import FaultInjector
     from proxcgal.sim.setup import Setup
 
+    announce(f"setting up {scenario.name} (a robot's first time takes a while)", quiet=quiet)
     setup = Setup.of(scenario)
     for controller in controllers:
         setup.make_controller(controller)

@@ -79,7 +79,7 @@ def run_command(options: RunOptions, command: str) -> int:
     workers = checked_workers(options.workers)
     scenario = load_scenario(options.scenario, overrides(options))
     controllers = tuple(dict.fromkeys(options.controller))
-    check(scenario, controllers)
+    check(scenario, controllers, quiet=options.quiet)
     folder = options.out or Path("out") / scenario.name
     plan = Plan(scenario=scenario, controllers=controllers, folder=folder)
     summaries = perform(
