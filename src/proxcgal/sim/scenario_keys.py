@@ -131,6 +131,9 @@ class Simulation(Section):
     control_hz: Positive = Field(100.0, description="ticks a second")
     sensor_hz: Positive = Field(15.0, description="scans of each sensor a second")
     stagger: bool = Field(False, description="sensors take turns instead of measuring at once")
+    known_spacing: Positive = Field(
+        0.01, description="[m] between known points, along the edges of the scene's surfaces"
+    )
     sub_rays: Literal[1, 4, 9, 16] = Field(
         1, description="rays cast in each zone, of which the nearest counts"
     )

@@ -45,8 +45,13 @@ class Setup:
         """Does this controller get points of the scene itself instead of scans?"""
         return controller == "wb_known" or self.scenario.perception == "known"
 
-    def known_points(self, spacing: float = 0.01) -> Array:
-        """(n, 3) points of the scene's own surfaces, at most `spacing` apart [m]."""
+    def known_points(self, spacing: float | None = None) -> Array:
+        """(n, 3) points of the scene's own surfaces [m].
+
+        Args:
+            spacing: they are at most this far apart [m]; left out: that of the scenario.
+        """
+        spacing = spacing or self.scenario.simulation.known_spacing
         clouds = [boxes.points(box.size, box.pose(), spacing) for box in self.scenario.obstacles]
         return np.concatenate([*clouds, np.empty((0, 3))])
 
