@@ -49,7 +49,7 @@ _TAKEN = 0.6
 _PASSES = 3
 # Spacing of the samples that hold the tolerance [m], and how many there may be on the old surface.
 _SPACING = 0.004
-_MOST_SAMPLES = 60_000
+_MOST_SAMPLES = 20_000
 
 
 class _Surface:
@@ -61,6 +61,7 @@ class _Surface:
         self.count = len(np.unique(self.f))
         self.tolerance = tolerance
         self.blocked = np.empty(0, dtype=np.int64)  # edges (as keys) that would move points too far
+        self.strict = True  # keep parts, rims and the sense of faces
         if np.isfinite(tolerance):
             self.old = MeshTree(vertices, triangles)
             area = double_areas(vertices, triangles).sum() / 2
@@ -94,8 +95,9 @@ class _Surface:
         rows = np.argpartition(key, take - 1)[:take]
         rows = rows[np.isfinite(key[rows])]
         start, face_of = faces_per_vertex(self.f, n)
-        rows = rows[self._keeps_topology(edges[rows], faces_on_edge[rows], start, face_of)]
-        rows = rows[self._keeps_faces(edges[rows], place[rows], start, face_of)]
+        if self.strict:
+            rows = rows[self._keeps_topology(edges[rows], faces_on_edge[rows], start, face_of)]
+            rows = rows[self._keeps_faces(edges[rows], place[rows], start, face_of)]
         rows = rows[np.argsort(key[rows], kind="stable")][: max(50, int(_TAKEN * len(rows)))]
         rows = rows[self._independent(edges[rows])][: self.count - count]
         if np.isfinite(self.tolerance):
@@ -122,7 +124,8 @@ class _Surface:
         place[far] = middle[far]
         key = np.maximum(_cost(q, place), 0) + _LENGTH_WEIGHT * length**2
         # An edge through the inside that joins two rims would pinch the surface.
-        key[self.on_rim[a] & self.on_rim[b] & (faces_on_edge > 1)] = np.inf
+        if self.strict:
+            key[self.on_rim[a] & self.on_rim[b] & (faces_on_edge > 1)] = np.inf
         return place, key
 
     def _keeps_topology(
@@ -247,7 +250,7 @@ class _Surface:
         self.f = self.f[stays]
         if np.isfinite(self.tolerance):
             self.home = (np.cumsum(stays) - 1)[self.home]
-        self.count -= len(edges)
+        self.count = len(np.unique(self.f))
         # What moved may now be collapsed where it could not be before.
         changed = np.zeros(n, dtype=bool)
         changed[a] = changed[b] = True
@@ -265,14 +268,17 @@ def decimate(
         triangles: (f, 3).
         count: vertices to aim at.
         tolerance: bound on the distance between samples of the old surface and the new one, and
-            back [m]. Inf bounds nothing and reaches `count` wherever topology allows.
+            back [m]. Inf bounds nothing and reaches `count`, if need be without the smallest parts.
 
     Returns:
         vertices (about `count` or more, 3) and triangles of the new surface.
     """
     surface = _Surface(vertices, triangles, tolerance)
-    while surface.count > count and surface.round(count) != 0:
-        pass
+    while surface.count > count:
+        if surface.round(count) == 0:
+            if np.isfinite(tolerance) or not surface.strict:
+                break
+            surface.strict = False
     return compact(surface.v, surface.f)
 
 
@@ -280,9 +286,8 @@ def _quadric(normal: Floats, point: Floats, weight: Floats) -> Floats:
     """Squared distance to each plane, as the ten numbers of a symmetric 4 x 4 matrix."""
     a, b, c = normal.T
     d = -dot(normal, point)
-    return weight[:, None] * np.stack(
-        [a * a, a * b, a * c, b * b, b * c, c * c, a * d, b * d, c * d, d * d], axis=1
-    )
+    products = [a * a, a * b, a * c, b * b, b * c, c * c, a * d, b * d, c * d, d * d]
+    return np.asarray(weight[:, None] * np.stack(products, axis=1))
 
 
 def _cost(q: Floats, x: Floats) -> Floats:
@@ -316,4 +321,4 @@ def _face_vectors(p: Floats) -> Floats:
 
 def _longest(p: Floats) -> Floats:
     sides = p - np.roll(p, 1, axis=1)
-    return np.sqrt(np.maximum((sides**2).sum(2).max(1), 1e-300))
+    return np.asarray(np.sqrt(np.maximum((sides**2).sum(2).max(1), 1e-300)))

@@ -148,10 +148,13 @@ def _read_obj(data: bytes, path: Path) -> tuple[Floats, Ints]:
 
 def _read_with_trimesh(data: bytes, path: Path) -> tuple[Floats, Ints]:
     suffix = path.suffix.lower()
-    if suffix == ".stl" and data[:5].lower() != b"solid" and len(data) >= 84:
+    if suffix == ".stl" and data[:5].lower() != b"solid":
         count = int.from_bytes(data[80:84], "little")
         if count > MAX_FACES:
             raise GeometryError(f"{path}: {count} faces; at most {MAX_FACES} are taken")
+        if len(data) < 84 + 50 * count:
+            raise GeometryError(f"{path}: cut off: {count} faces take {84 + 50 * count} bytes, "
+                                f"{len(data)} are there")  # fmt: skip
     unit = 1.0
     if suffix == ".dae":
         # In metres per unit, which trimesh notes and does not apply. The up axis is left alone, as

@@ -145,7 +145,8 @@ def describe(
                 f"{source}: joint '{model.names[i]}' has {kind.nv} degrees of freedom; revolute "
                 "and prismatic joints are read"
             )
-        motion = pin.getJointJacobian(model, data, i, pin.LOCAL)[:, kind.idx_v]
+        jacobian = pin.getJointJacobian(model, data, i, pin.LOCAL).reshape(6, model.nv)
+        motion = jacobian[:, kind.idx_v]
         linear = np.linalg.norm(motion[:3]) > 0.5
         axis = motion[:3] if linear else motion[3:]
         low, high = limits.get(

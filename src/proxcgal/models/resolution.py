@@ -21,7 +21,7 @@ COUNT_TOLERANCE = 0.1
 _SPACING = 0.001
 _MOST_SAMPLES = 400_000
 # Collapses keep within this share of the bound: between samples the surface may be farther off.
-_MARGINS = (0.9, 0.75, 0.5, 0.25)
+_MARGINS = (0.85, 0.7, 0.5, 0.25)
 # What is measured may be a little less than what a denser look would find.
 _SURE = 0.97
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -179,13 +180,19 @@ def control_meshes(
     description: RobotDescription, count: int | None, max_deviation: float
 ) -> list[ControlMesh]:
     """The controller's mesh of each link, with one warning for all that keep more vertices."""
-    control, more = [], []
-    for link in description.links:
-        mesh = control_mesh(link.vertices_L, link.triangles, count, max_deviation)
-        control.append(mesh)
-        if count is not None and len(mesh.vertices_L) > (1 + COUNT_TOLERANCE) * count:
-            more.append(f"'{link.name}' {len(mesh.vertices_L)} "
-                        f"(deviation {mesh.deviation * 1000:.2f} mm)")  # fmt: skip
+    # Most of the work is in numpy and in the trees, which let other threads run meanwhile.
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        control = list(
+            pool.map(
+                lambda link: control_mesh(link.vertices_L, link.triangles, count, max_deviation),
+                description.links,
+            )
+        )
+    more = [
+        f"'{link.name}' {len(mesh.vertices_L)} (deviation {mesh.deviation * 1000:.2f} mm)"
+        for link, mesh in zip(description.links, control, strict=True)
+        if count is not None and len(mesh.vertices_L) > (1 + COUNT_TOLERANCE) * count
+    ]
     if more:
         bound = f"{max_deviation * 1000:g} mm" if np.isfinite(max_deviation) else "any deviation"
         warnings.warn(

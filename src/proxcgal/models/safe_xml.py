@@ -12,7 +12,7 @@ from proxcgal.errors import ModelError
 
 MAX_BYTES = 64 * 2**20
 MAX_DEPTH = 256  # nested tags; a chain of bodies in an MJCF nests one per joint
-MAX_ELEMENTS = 200_000
+MAX_ELEMENTS = 100_000
 _CHUNK = 2**16
 
 
