@@ -26,7 +26,7 @@ _RAW: Color = (0.25, 0.45, 0.95, 0.55)
 _PAIR: Color = (0.05, 0.60, 0.20, 1.0)
 _AXES: tuple[Color, ...] = ((0.9, 0.1, 0.1, 1.0), (0.1, 0.7, 0.1, 1.0), (0.1, 0.2, 0.9, 1.0))
 _GIF_COLORS = 128
-_ASIDE, _DOWN = 1.05, -0.38  # [rad] of the view against the obstacle's direction
+_ASIDE, _DOWN = -1.05, -0.38  # [rad] of the view against the obstacle's direction
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ def viewpoint(setup: Setup) -> Camera:
     face_W = min(faces, key=lambda point: float(np.linalg.norm(point - base_W)), default=tool_W)
     across = np.arctan2(face_W[1], face_W[0])
     middle = (base_W + tool_W + face_W) / 3.0
-    return Camera(tuple(middle.tolist()), 2.1, float(across) + _ASIDE, _DOWN)
+    return Camera(tuple(middle.tolist()), 2.4, float(across) + _ASIDE, _DOWN)
 
 
 def draw(
