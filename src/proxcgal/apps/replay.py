@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -56,7 +56,7 @@ class ReplayOptions:
 def replay_command(options: ReplayOptions, command: str) -> int:
     """Prints the ticks asked for and the run's numbers."""
     from proxcgal.sim.recording import read_recording
-    from proxcgal.sim.replay import Replay, recompute, recorded_log
+    from proxcgal.sim.replay import recorded_log
 
     if options.every < 1:
         raise ConfigError(f"--every {options.every}: must be 1 or more")
@@ -67,19 +67,30 @@ def replay_command(options: ReplayOptions, command: str) -> int:
         raise ConfigError(f"{options.file}: holds no tick")
     changes = flat(options.set)
     again = options.controller is not None or bool(changes)
-    if options.at is not None:
-        row = _row_at(recording, options.at)
-        ticks = list(Replay(recording, options.controller, changes)) if again else recording.ticks
-        _print_header(recording)
-        _show_tick(ticks[row])
+    row = None if options.at is None else _row_at(recording, options.at)
+    shown = _recomputed(recording, options.controller, changes) if again else recording
+    _print_header(shown)
+    if row is not None:
+        _show_tick(shown.ticks[row])
         return 0
-    log = recompute(recording, options.controller, changes) if again else recorded_log(recording)
-    _print_header(recording)
-    _walk(_lines(log, options.every), step=options.step)
+    log = recorded_log(shown)
+    _walk(_lines(log, shown.ticks, options.every), step=options.step)
     _print_summary(log)
     if again:
         _compare(recording, log)
     return 0
+
+
+def _recomputed(recording: Recording, controller: str | None, changes: Sequence[str]) -> Recording:
+    """The recording as if its inputs had met this controller; the arm moves as recorded."""
+    from proxcgal.sim.replay import Replay
+
+    again = Replay(recording, controller, changes)
+    ticks = tuple(again)
+    settings = replace(
+        recording.settings, controller=again.controller, scenario=again.setup.scenario
+    )
+    return replace(recording, ticks=ticks, settings=settings)
 
 
 def _print_header(recording: Recording) -> None:
@@ -90,18 +101,19 @@ def _print_header(recording: Recording) -> None:
     )
 
 
-def _lines(log: TrialLog, every: int) -> Iterator[str]:
-    """A line a tick: distances in m, the link that avoidance moves, findings with their sensor."""
+def _lines(log: TrialLog, ticks: Sequence[Tick], every: int) -> Iterator[str]:
+    """A line a tick: distances in m, the link that avoidance moves, what was found."""
     width = max(map(len, log.control_link), default=0)
     yield (
         f"{'time':>7}  {'seen':>6}  {'true':>6}  {'act':>4}  {'goal':>6}  {'mode':<8}  "
-        f"{'moves':<{width}}"
-    ).rstrip()
+        f"{'moves':<{width}}  findings"
+    )
     for row in range(0, len(log.time), every):
+        found = ", ".join(dict.fromkeys(f.reason for f in ticks[row].result.findings))
         yield (
             f"{log.time[row]:7.2f}  {_metres(log.seen_m[row])}  {_metres(log.true_m[row])}  "
             f"{log.activation[row]:4.2f}  {log.goal_error_m[row]:6.3f}  "
-            f"{MODES[log.mode[row]]:<8}  {log.control_link[row]}"
+            f"{MODES[log.mode[row]]:<8}  {log.control_link[row]:<{width}}  {found}"
         ).rstrip()
 
 
