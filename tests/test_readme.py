@@ -1,4 +1,4 @@
-"""README: its Python runs as written, its commands exist."""
+"""README: its Python runs as written, its commands exist; docs name files that are there."""
 
 import re
 import shlex
@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+import proxcgal as px
 from proxcgal.apps import cli
 
 ROOT = Path(__file__).parents[1]
@@ -59,6 +60,23 @@ def test_every_file_that_the_readme_shows_or_links_is_there() -> None:
     links = re.findall(r"\]\(([^)#]+)[^)]*\)", README)
     assert links
     assert [link for link in links if "://" not in link and not (ROOT / link).exists()] == []
+
+
+@pytest.mark.parametrize("document", ["conventions.md", "sources.md"])
+def test_every_source_file_that_a_document_names_is_there(document: str) -> None:
+    text = (ROOT / "docs" / document).read_text()
+    named = re.findall(r"`((?:cpp|src|tests|scenarios|docs)/[^`*]*)", text)
+    places = (ROOT, ROOT / "src" / "proxcgal")
+    assert [name for name in named if not any((place / name).exists() for place in places)] == []
+
+
+def test_conventions_explain_every_finding_and_every_mode() -> None:
+    text = (ROOT / "docs" / "conventions.md").read_text()
+    monitor = (ROOT / "cpp" / "src" / "safety" / "monitor.cpp").read_text()
+    reasons = set(re.findall(r'return "(\w+)";', monitor)) - {"unknown"}
+    assert reasons
+    assert {reason for reason in reasons if f"| `{reason}` |" not in text} == set()
+    assert {mode.name for mode in px.Mode if f"| {mode.name} |" not in text} == set()
 
 
 def test_the_commands_come_before_what_it_does_and_the_picture_before_them() -> None:
