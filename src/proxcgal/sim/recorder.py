@@ -165,6 +165,8 @@ class Recorder:
         self._count += 1
 
     def _fail(self, error: OSError) -> None:
+        if self.failure is not None:  # told already
+            return
         self.failure = f"recording {self.path} stopped: {error.strerror}"
         warnings.warn(self.failure, RuntimeWarning, stacklevel=4)
 
