@@ -52,13 +52,14 @@ def control_mesh(
     """
     if count is None or abs(len(vertices) - count) <= COUNT_TOLERANCE / 2 * count:
         return ControlMesh(vertices, triangles, 0.0)
-    if len(vertices) < count:
-        return ControlMesh(*subdivide(vertices, triangles, count), 0.0)
     cache = Cache("control")
     key = [_VERSION, hash_mesh(vertices, triangles), count, json.dumps(max_deviation)]
     if (kept := cache.get(key)) is not None and {"v", "f"} <= kept.arrays.keys():
         return ControlMesh(kept.arrays["v"], kept.arrays["f"], float(kept.meta["deviation"]))
-    made = _coarser(vertices, triangles, count, max_deviation)
+    if len(vertices) < count:
+        made = ControlMesh(*subdivide(vertices, triangles, count), 0.0)
+    else:
+        made = _coarser(vertices, triangles, count, max_deviation)
     cache.put(key, Stored({"v": made.vertices_L, "f": made.triangles},
                           {"deviation": made.deviation}))  # fmt: skip
     return made
