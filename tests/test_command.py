@@ -146,6 +146,18 @@ def test_lower_levels_never_hold_the_top_task_back(random: np.random.Generator) 
     assert missing(command) <= missing(alone) + 1e-5
 
 
+@given(seeds)
+def test_a_solution_that_stays_is_reached(random: np.random.Generator) -> None:
+    limits, tasks = random_limits(random), random_tasks(random)
+    limits.q_min, limits.q_max = np.full(6, -99.0), np.full(6, 99.0)
+    solution = px.solve(tasks, limits.qd_max)
+    qd = random.uniform(-1, 1, 6) * limits.qd_max
+    straight = np.max(np.abs(solution.qd - qd) / (limits.qdd_max * DT))
+    for _ in range(50 + 10 * int(straight)):
+        qd = _core.command(tasks, solution, qd, limits.box(np.zeros(6), qd))
+    np.testing.assert_array_equal(qd, solution.qd)
+
+
 def test_joints_come_to_rest_together() -> None:
     limits = Limits(-9 * np.ones(2), 9 * np.ones(2), 2 * np.ones(2), np.array([10.0, 4.0]))
     qd = np.array([1.5, -0.4])
