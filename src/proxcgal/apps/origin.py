@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 #: Packages whose version can change a result.
-PACKAGES = ("proxcgal", "numpy", "mujoco", "pin", "trimesh", "fast-simplification")
+PACKAGES = ("proxcgal", "numpy", "mujoco", "pin", "trimesh")
 
 
 def origin(command: str) -> dict[str, Any]:
