@@ -16,9 +16,9 @@ from proxcgal.sim.setup import Setup
 from proxcgal.sim.world import Camera, World
 from proxcgal.study.figures import COLOURS, NAMES
 
-FPS = 10.0
-FRAMES = 60  # of the run; the last one is then held
-HELD = 10
+FPS = 8.0
+FRAMES = 50  # of the run; the last one is then held
+HELD = 8
 PANE = (400, 360)  # [px] width and height of one run's picture
 STRIP = 48  # [px] of text below it
 
