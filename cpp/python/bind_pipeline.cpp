@@ -1,3 +1,4 @@
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/tuple.h>
 
 #include <memory>
@@ -174,7 +175,13 @@ void bind_skin(nb::module_& m) {
           [](const SensorModel& s) { return choice_name(s.range_model, kRangeModels); },
           "'tangent', or 'printed' as [WA] eq. (1) has it.")
       .def("sigma", &SensorModel::sigma, "range"_a, "Standard deviation of a range [m].")
-      .def("__eq__", [](const SensorModel& a, const SensorModel& b) { return a == b; });
+      .def(
+          "__eq__",
+          [](const SensorModel& self, const nb::object& other) {
+            SensorModel model;
+            return nb::try_cast(other, model) && self == model;
+          },
+          nb::sig("def __eq__(self, other: object, /) -> bool"));
   m.def("zone_directions", &zone_directions, "model"_a,
         "(64, 3) point of each zone at range 1 m, in the sensor's frame: [WA] eq. (1). Zone = 8 "
         "row + column.");
