@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxcgal._core import MeshTree
+from proxcgal.models.quadrics import cost, minimum, surface_quadrics
 from proxcgal.models.triangles import (
     Floats,
     Ints,
@@ -26,16 +27,11 @@ from proxcgal.models.triangles import (
     faces_per_vertex,
     gather,
     point_triangle_distance,
-    rims,
     sample,
-    unit_normals,
 )
 
 Bools = NDArray[np.bool_]
 
-# Pulls a new vertex to its edge's middle where the quadric leaves it free (flat or straight parts);
-# without it the vertex may run off along the free direction.
-_STABILITY = 1e-3
 # Of two equally flat edges the shorter goes first: keeps triangles round.
 _LENGTH_WEIGHT = 1e-9
 # A collapse may not turn a face by more than about 73 degrees.
@@ -47,6 +43,10 @@ _MIN_ASPECT = 0.02
 _CANDIDATES = 0.3
 _TAKEN = 0.6
 _PASSES = 3
+# Where any tolerance goes, as small a one as will do is looked for from here, by doubling [m].
+_FIRST_TOLERANCE = 0.002
+# Past this one, small parts and the topology are given up first [m].
+_STRICT_TOLERANCE = 0.008
 # Spacing of the samples that hold the tolerance [m], and how many there may be on the old surface.
 _SPACING = 0.004
 _MOST_SAMPLES = 20_000
@@ -62,28 +62,14 @@ class _Surface:
         self.tolerance = tolerance
         self.blocked = np.empty(0, dtype=np.int64)  # edges (as keys) that would move points too far
         self.strict = True  # keep parts, rims and the sense of faces
+        self.share = _CANDIDATES
         if np.isfinite(tolerance):
             self.old = MeshTree(vertices, triangles)
             area = double_areas(vertices, triangles).sum() / 2
             spacing = max(_SPACING, float(np.sqrt(area / _MOST_SAMPLES)))
             # Every sample hangs on the face that stands for its surroundings now.
             self.samples, self.home = sample(vertices, triangles, spacing)
-        n = len(vertices)
-        normal, area = unit_normals(vertices, self.f)
-        self.Q = np.zeros((n, 10))
-        face_q = _quadric(normal, vertices[self.f[:, 0]], area / 3)
-        for corner in range(3):
-            np.add.at(self.Q, self.f[:, corner], face_q)
-        # A rim has one face: planes that stand on it keep it in place.
-        rim, rim_face = rims(self.f, n)
-        along = vertices[rim[:, 1]] - vertices[rim[:, 0]]
-        across = cross(along, normal[rim_face])
-        across /= np.maximum(np.linalg.norm(across, axis=1), 1e-300)[:, None]
-        rim_q = _quadric(across, vertices[rim[:, 0]], (along**2).sum(1))
-        for end in range(2):
-            np.add.at(self.Q, rim[:, end], rim_q)
-        self.on_rim = np.zeros(n, dtype=bool)
-        self.on_rim[rim.ravel()] = True
+        self.Q, self.on_rim = surface_quadrics(vertices, self.f)
 
     def round(self, count: int) -> int:
         """One round of independent collapses; returns how many were tried."""
@@ -91,7 +77,7 @@ class _Surface:
         edges, faces_on_edge = edges_of(self.f, n)
         place, key = self._placements(edges, faces_on_edge)
         key[np.isin(edges[:, 0] * n + edges[:, 1], self.blocked)] = np.inf
-        take = min(max(int(_CANDIDATES * len(edges)), 200), len(edges))
+        take = min(max(int(self.share * len(edges)), 200), len(edges))
         rows = np.argpartition(key, take - 1)[:take]
         rows = rows[np.isfinite(key[rows])]
         start, face_of = faces_per_vertex(self.f, n)
@@ -110,19 +96,28 @@ class _Surface:
         self._collapse(edges[rows], place[rows])
         return tried
 
+    def loosen(self, size: float) -> None:
+        """Allow twice the tolerance; when that has not helped, parts may go, small ones first."""
+        self.blocked = np.empty(0, dtype=np.int64)
+        self.tolerance *= 2
+        if self.strict and self.tolerance > _STRICT_TOLERANCE:
+            self.tolerance, self.strict = _FIRST_TOLERANCE, False
+        elif self.tolerance > size:
+            self.tolerance = np.inf
+
     def _placements(self, edges: Ints, faces_on_edge: Ints) -> tuple[Floats, Floats]:
         """Where each edge would go, and what it costs [m^4]."""
         a, b = edges.T
         q = self.Q[a] + self.Q[b]
         middle = (self.v[a] + self.v[b]) / 2
         length = np.linalg.norm(self.v[a] - self.v[b], axis=1)
-        place = _minimum(q, middle)
+        place = minimum(q, middle)
         # Towards a rim, not away from it.
         one = self.on_rim[a] ^ self.on_rim[b]
         place[one] = np.where(self.on_rim[a][:, None], self.v[a], self.v[b])[one]
         far = np.linalg.norm(place - middle, axis=1) > 1.5 * length
         place[far] = middle[far]
-        key = np.maximum(_cost(q, place), 0) + _LENGTH_WEIGHT * length**2
+        key = np.maximum(cost(q, place), 0) + _LENGTH_WEIGHT * length**2
         # An edge through the inside that joins two rims would pinch the surface.
         if self.strict:
             key[self.on_rim[a] & self.on_rim[b] & (faces_on_edge > 1)] = np.inf
@@ -191,8 +186,13 @@ class _Surface:
         distance = point_triangle_distance(self.samples[held[pair]], after[face])
         best = np.lexsort((distance, pair))
         best = best[np.r_[True, np.diff(pair[best]) > 0]] if len(best) else best
+        nearest, home = np.full(len(held), np.inf), np.full(len(held), -1)
+        nearest[pair[best]], home[pair[best]] = distance[best], faces[face[best]]
+        # Where nothing is left of a part, the point it went to stands for it.
+        gone = home < 0
+        nearest[gone] = np.linalg.norm(self.samples[held[gone]] - place[of[gone]], axis=1)
         good = np.ones(len(edges), dtype=bool)
-        good[of[distance[best] > self.tolerance]] = False
+        good[of[nearest > self.tolerance]] = False
 
         check = np.nonzero(good[edge])[0]
         points, on = sample(after[check].reshape(-1, 3), np.arange(3 * len(check)).reshape(-1, 3),
@@ -201,7 +201,7 @@ class _Surface:
         good[edge[check[on[off[: len(points)]]]]] = False
         good[off[len(points) :]] = False
         done = good[of]
-        return good, held[done], faces[face[best]][done]
+        return good, held[done], home[done]
 
     def _ring(
         self, edges: Ints, end: int, start: Ints, face_of: Ints
@@ -249,7 +249,7 @@ class _Surface:
         stays = (self.f != np.roll(self.f, 1, axis=1)).all(1)
         self.f = self.f[stays]
         if np.isfinite(self.tolerance):
-            self.home = (np.cumsum(stays) - 1)[self.home]
+            self.home = np.where(self.home < 0, -1, (np.cumsum(stays) - 1)[self.home])
         self.count = len(np.unique(self.f))
         # What moved may now be collapsed where it could not be before.
         changed = np.zeros(n, dtype=bool)
@@ -268,51 +268,25 @@ def decimate(
         triangles: (f, 3).
         count: vertices to aim at.
         tolerance: bound on the distance between samples of the old surface and the new one, and
-            back [m]. Inf bounds nothing and reaches `count`, if need be without the smallest parts.
+            back [m]. Inf keeps it as small as `count` allows, which is reached in any case, if need
+            be without the smallest parts.
 
     Returns:
         vertices (about `count` or more, 3) and triangles of the new surface.
     """
-    surface = _Surface(vertices, triangles, tolerance)
+    bounded = bool(np.isfinite(tolerance))
+    surface = _Surface(vertices, triangles, tolerance if bounded else _FIRST_TOLERANCE)
+    size = float(np.ptp(vertices, axis=0).max())
     while surface.count > count:
-        if surface.round(count) == 0:
-            if np.isfinite(tolerance) or not surface.strict:
-                break
-            surface.strict = False
+        if surface.round(count):
+            continue
+        if surface.share < 1:  # none of the cheap ones will do: look at all
+            surface.share = 1.0
+            continue
+        if bounded or not np.isfinite(surface.tolerance):
+            break
+        surface.loosen(size)
     return compact(surface.v, surface.f)
-
-
-def _quadric(normal: Floats, point: Floats, weight: Floats) -> Floats:
-    """Squared distance to each plane, as the ten numbers of a symmetric 4 x 4 matrix."""
-    a, b, c = normal.T
-    d = -dot(normal, point)
-    products = [a * a, a * b, a * c, b * b, b * c, c * c, a * d, b * d, c * d, d * d]
-    return np.asarray(weight[:, None] * np.stack(products, axis=1))
-
-
-def _cost(q: Floats, x: Floats) -> Floats:
-    a, b, c = x.T
-    return np.asarray(
-        q[:, 0] * a * a + q[:, 3] * b * b + q[:, 5] * c * c + q[:, 9]
-        + 2 * (q[:, 1] * a * b + q[:, 2] * a * c + q[:, 4] * b * c)
-        + 2 * (q[:, 6] * a + q[:, 7] * b + q[:, 8] * c)
-    )  # fmt: skip
-
-
-def _minimum(q: Floats, middle: Floats) -> Floats:
-    """Point of least cost, drawn to `middle` a little: (A + s I) x = s middle - b."""
-    pull = _STABILITY * (q[:, 0] + q[:, 3] + q[:, 5]) + 1e-30
-    xx, yy, zz = q[:, 0] + pull, q[:, 3] + pull, q[:, 5] + pull
-    xy, xz, yz = q[:, 1], q[:, 2], q[:, 4]
-    right = pull[:, None] * middle - q[:, 6:9]
-    c0 = np.stack([yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy], axis=1)
-    c1 = np.stack([c0[:, 1], xx * zz - xz * xz, xy * xz - xx * yz], axis=1)
-    c2 = np.stack([c0[:, 2], c1[:, 2], xx * yy - xy * xy], axis=1)
-    determinant = xx * c0[:, 0] + xy * c0[:, 1] + xz * c0[:, 2]
-    rows = [dot(c, right) for c in (c0, c1, c2)]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        x = np.stack(rows, axis=1) / determinant[:, None]
-    return np.where(np.isfinite(x), x, middle)
 
 
 def _face_vectors(p: Floats) -> Floats:

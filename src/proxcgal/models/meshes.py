@@ -159,8 +159,11 @@ def _read_with_trimesh(data: bytes, path: Path) -> tuple[Floats, Ints]:
     if suffix == ".dae":
         # In metres per unit, which trimesh notes and does not apply. The up axis is left alone, as
         # ROS and pinocchio do.
-        asset = parse_xml(path, {"COLLADA"}).find("asset/unit")
-        unit = float(asset.get("meter", "1")) if asset is not None else 1.0
+        try:
+            asset = parse_xml(path, {"COLLADA"}).find("asset/unit")
+            unit = float(asset.get("meter", "1")) if asset is not None else 1.0
+        except ValueError as error:
+            raise GeometryError(str(error)) from None
     import trimesh  # here, because a warm cache does without it
 
     try:
