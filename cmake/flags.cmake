@@ -8,8 +8,10 @@ target_compile_options(
             $<$<BOOL:${PROXCGAL_MARCH}>:-march=${PROXCGAL_MARCH}>)
 # Left out on purpose: -Wconversion, as Eigen's sizes are signed and the standard library's are not;
 # -Wmissing-field-initializers, as a field that is not named keeps its default; -Wpsabi, as wide
-# vectors pass between functions of one library only.
-target_compile_options(proxcgal_flags INTERFACE -Wno-missing-field-initializers -Wno-psabi)
+# vectors pass between functions of one library only; GCC's -Wrestrict, which GCC 12 raises inside
+# std::string for nothing.
+target_compile_options(proxcgal_flags INTERFACE -Wno-missing-field-initializers -Wno-psabi
+                                                 $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>)
 
 if(PROXCGAL_SANITIZE)
   target_compile_options(proxcgal_flags INTERFACE -fsanitize=${PROXCGAL_SANITIZE}

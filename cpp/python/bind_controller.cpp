@@ -166,7 +166,7 @@ void bind_output(nb::module_& m) {
   nb::class_<Output>(m, "TickOutput", "Everything one tick tells.")
       .def_ro("qd", &Output::qd, "(n_q,) admissible joint velocity [rad/s or m/s].")
       .def_ro("pair", &Output::pair,
-              "The closest pair that drives the arm; None when nothing is in view.")
+              "Nearest of the links that joints can move away; None when nothing is in view.")
       .def_prop_ro(
           "pair_sensor", [](const Output& o) { return o.origin.sensor; },
           "Sensor that saw the pair's obstacle point, -1 for none.")

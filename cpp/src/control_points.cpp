@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "proxcgal/error.hpp"
+
 namespace proxcgal::detail {
 namespace {
 
@@ -30,13 +32,33 @@ ControlPoints::ControlPoints(const Robot& robot, const Skin& skin, const Control
   const auto moves = [&](int link) {
     return robot.spec().links[static_cast<std::size_t>(link)].joint >= 0;
   };
-  for (const std::string& name : config.avoid_links) links_.push_back(robot.link_row(name));
+  for (const std::string& name : config.avoid_links) {
+    const int link = robot.link_row(name);
+    if (std::find(links_.begin(), links_.end(), link) != links_.end()) {
+      throw ConfigError("controller: avoid_links names '" + name + "' twice");
+    }
+    links_.push_back(link);
+  }
   for (int link = 0; config.avoid_links.empty() && link < robot.n_links(); ++link) {
     if (moves(link)) links_.push_back(link);
   }
   for (const Mount& mount : skin.mounts) {
     const int link = robot.link_row(mount.link);
     sensor_link_.push_back(moves(link) ? link : -1);
+  }
+  const bool avoids = std::any_of(config.tasks.begin(), config.tasks.end(), [](const auto& task) {
+    return std::holds_alternative<Avoidance>(task);
+  });
+  if (avoids && links_.empty()) {
+    throw ConfigError("controller: no joint moves a link of robot '" + robot.spec().name +
+                      "' that carries a mesh, so avoidance could do nothing");
+  }
+  const bool any_sensor =
+      std::any_of(sensor_link_.begin(), sensor_link_.end(), [](int link) { return link >= 0; });
+  if (avoids && config.control_point == ControlPoint::kSensor && !any_sensor) {
+    throw ConfigError(
+        "controller: control_point is 'sensor', but the skin has no sensor on a link that a joint "
+        "moves");
   }
   candidates_.reserve(links_.size());
   per_link_.resize(links_.size());
@@ -47,16 +69,16 @@ std::optional<ClosestPair> ControlPoints::nearest(const Robot& robot, const Post
                                                   const PointsRef& cloud_W, double engaged_within,
                                                   Monitor& monitor) {
   candidates_.assign(links_.begin(), links_.end());
+  ClosestPair skipped;  // the nearest of those passed over
   while (!candidates_.empty()) {
     const ClosestPair pair = closest_pair(robot, posture, cloud_W, method_, candidates_);
     if (!pair.found()) return std::nullopt;
     if (row_norm(robot, posture, control_of(pair, Vector3::Zero())) >= min_row_norm_) return pair;
     note(monitor, Reason::kLinkSkipped, pair.link);
+    if (!skipped.found()) skipped = pair;
     candidates_.erase(std::find(candidates_.begin(), candidates_.end(), pair.link));
-    if (candidates_.empty() && pair.distance < engaged_within) {
-      note(monitor, Reason::kNoControllableLink, pair.link);
-    }
   }
+  if (skipped.distance < engaged_within) note(monitor, Reason::kNoControllableLink, skipped.link);
   return std::nullopt;
 }
 

@@ -25,43 +25,6 @@ bool is_rigid(const Pose& T) {
 
 }  // namespace
 
-void FilterConfig::validate() const {
-  const auto require = [](bool ok, const char* field, double value, const char* allowed) {
-    if (!ok) {
-      throw ConfigError(std::string("filter: ") + field + " is " + std::to_string(value) +
-                        ", allowed is " + allowed);
-    }
-  };
-  require(std::isfinite(tolerance) && tolerance >= 0.0, "tolerance", tolerance, "0 m or more");
-  require(std::isfinite(sigmas) && sigmas >= 0.0, "sigmas", sigmas, "0 or more");
-  require(std::isfinite(min_hit) && min_hit >= 0.0, "min_hit", min_hit, "0 m or more");
-  require(!std::isnan(z_min) && z_min < kInfinity, "z_min", z_min,
-          "a height [m], -inf for no crop");
-}
-
-void ControllerConfig::validate() const {
-  if (tasks.empty()) throw ConfigError("controller: tasks is empty, at least one is needed");
-  if (tasks.size() > kMaxLevels) {
-    throw ConfigError("controller: " + std::to_string(tasks.size()) + " tasks, at most " +
-                      std::to_string(kMaxLevels) + " are supported");
-  }
-  for (const TaskSpec& task : tasks) proxcgal::validate(task);
-  filter.validate();
-  solver.validate();
-  monitor.validate();
-  if (!(period > 0.0 && period <= kLongestStep)) {
-    throw ConfigError("controller: period is " + std::to_string(period) +
-                      ", allowed is above 0 to 0.5 s");
-  }
-  if (!(min_row_norm >= 0.0 && min_row_norm < 1.0)) {
-    throw ConfigError("controller: min_row_norm is " + std::to_string(min_row_norm) +
-                      ", allowed is 0 to 1");
-  }
-  if (max_points < 1)
-    throw ConfigError("controller: max_points is " + std::to_string(max_points) +
-                      ", allowed is 1 or more");
-}
-
 struct Controller::Impl {
   std::shared_ptr<const Robot> robot;
   Skin skin;
@@ -112,6 +75,11 @@ struct Controller::Impl {
 
   void advance(double time) {
     const double step = time - caller_time;
+    if (!std::isfinite(time)) {
+      clock += started ? config.period : 0.0;
+      note(Reason::kTimeInvalid);
+      return;
+    }
     if (!started) {
       clock = 0.0;
     } else if (step > 0.0 && step <= kLongestStep) {
@@ -121,7 +89,7 @@ struct Controller::Impl {
       note(Reason::kTimeInvalid);
     }
     started = true;
-    caller_time = std::isfinite(time) ? time : caller_time;
+    caller_time = time;
   }
 
   /// Joint state and goal are usable; else the reason is noted.
@@ -165,13 +133,17 @@ struct Controller::Impl {
               build_manipulability(spec, *robot, posture, task);
           },
           config.tasks[level]);
-      if (task.smallest_row_norm < kSmallRowNorm) note(Reason::kRowSmall);
+      if (task.smallest_row_norm < kSmallRowNorm && task.task.activation.maxCoeff() > 0.0) {
+        note(Reason::kRowSmall);
+      }
       stack[level] = task.task;
     }
   }
 
+  /// Within this distance having nothing to move away is a cause to hold [m].
   double engaged_within() const {
     double reach = 0.0;
+    if (config.control_point == ControlPoint::kSensor) return reach;  // another point is moved
     for (const TaskSpec& task : config.tasks) {
       if (const auto* avoid = std::get_if<Avoidance>(&task))
         reach = std::max(reach, avoid->d_min + avoid->buffer);
@@ -179,22 +151,28 @@ struct Controller::Impl {
     return reach;
   }
 
+  /// Was avoidance asked for more than the command gives?
+  void judge() {
+    for (std::size_t level = 0; level < config.tasks.size(); ++level) {
+      if (!std::holds_alternative<Avoidance>(config.tasks[level])) continue;
+      const Task& task = stack[level];
+      const RowVector missing = residual(task, out.qd);
+      for (Eigen::Index row = 0; row < task.rate.size(); ++row) {
+        const bool engaged = task.activation[row] > kEngaged && task.rate[row] > 0.0;
+        if (engaged && missing[row] > kExecuted * task.rate[row]) {
+          note(Reason::kNotExecuted, out.control.link);
+          return;
+        }
+      }
+    }
+  }
+
+  /// What each task wanted, and what is missing of it in the command that is issued.
   void report() {
     for (std::size_t level = 0; level < config.tasks.size(); ++level) {
       const Task& task = stack[level];
-      TaskReport& told = out.tasks[level];
-      told.name = task_name(config.tasks[level]);
-      told.rate = task.rate;
-      told.activation = task.activation;
-      told.residual = residual(task, out.qd);
-      if (!std::holds_alternative<Avoidance>(config.tasks[level])) continue;
-      for (Eigen::Index row = 0; row < task.rate.size(); ++row) {
-        const bool engaged = task.activation[row] > kEngaged && task.rate[row] > 0.0;
-        if (engaged && told.residual[row] > kExecuted * task.rate[row]) {
-          note(Reason::kNotExecuted, out.control.link);
-          break;
-        }
-      }
+      out.tasks[level] = {task_name(config.tasks[level]), task.rate, task.activation,
+                          residual(task, out.qd)};
     }
   }
 
@@ -204,8 +182,8 @@ struct Controller::Impl {
     detail::Stopwatch watch(config.timings);
     robot->update(q, posture);
     out.pair = control_points.nearest(*robot, posture, cloud_W, engaged_within(), monitor);
-    out.timings.distance_us = watch.lap_us();
     build_stack(cloud_W, velocity_W, goal);
+    out.timings.distance_us = watch.lap_us();
     const std::span<const Task> tasks(stack.data(), config.tasks.size());
     solve(tasks, robot->n_q(), limits.qd_max, config.solver, solution);
     const Mode mode = monitor.mode();  // of the last tick: this one's findings are not complete yet
@@ -214,7 +192,7 @@ struct Controller::Impl {
     command({solution.rho.data(), static_cast<std::size_t>(solution.levels) + 1}, tasks, qd_last,
             box, out.qd);
     out.timings.solve_us = watch.lap_us();
-    report();
+    judge();
     if ((q.array() < limits.q_min.array() || q.array() > limits.q_max.array()).any())
       note(Reason::kOutsideLimits);
   }
@@ -227,6 +205,7 @@ struct Controller::Impl {
       decelerate(qd_last, admissible(limits, at, qd_last, config.period, 1.0), out.qd);
     }
     qd_last = out.qd;
+    if (usable) report();
   }
 
   void begin(double time, bool late) {

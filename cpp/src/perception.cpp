@@ -9,6 +9,7 @@ namespace proxcgal::detail {
 namespace {
 
 constexpr double kStampSlack = 1e-3;  // [s] a stamp this far in the future is clock resolution
+constexpr double kOldestStamp = 0.5;  // [s] an older scan says nothing of now
 
 }  // namespace
 
@@ -69,16 +70,15 @@ bool Perception::accept(double time, double delay, const Scan& scan, Monitor& mo
   Sensor& sensor = sensors_[static_cast<std::size_t>(scan.sensor)];
   // The counter may wrap: what matters is which way it moved.
   const bool advanced =
-      !sensor.seen || static_cast<std::int32_t>(scan.counter - sensor.counter) > 0;
+      !sensor.counted || static_cast<std::int32_t>(scan.counter - sensor.counter) > 0;
   const double stamp = scan.stamp + delay;
   refused.age = time - stamp;
-  if (!advanced || !(stamp <= time + kStampSlack)) {
+  if (!advanced || !(stamp <= time + kStampSlack) || !(refused.age <= kOldestStamp)) {
     monitor.add(refused);
     return false;
   }
-  sensor.seen = true;
+  sensor.counted = true;
   sensor.counter = scan.counter;
-  sensor.received = time;
   return true;
 }
 
@@ -96,11 +96,13 @@ void Perception::update(double time, double delay, const JointVector& q,
     const bool repeated = std::find(staged_.sensor.begin(), staged_.sensor.begin() + staged_.count,
                                     scan.sensor) != staged_.sensor.begin() + staged_.count;
     if (scan.stamp != placed || repeated) {
+      sense_us += watch.lap_us();
       filter();
+      filter_us += watch.lap_us();
       placed = scan.stamp;
       robot_->update(history_.at(scan.stamp + delay), posture_);
     }
-    stage(scan, monitor);
+    stage(time, scan, monitor);
     sense_us += watch.lap_us();
   }
   Stopwatch watch(timings);
@@ -109,7 +111,7 @@ void Perception::update(double time, double delay, const JointVector& q,
   filter_us += watch.lap_us();
 }
 
-void Perception::stage(const Scan& scan, Monitor& monitor) {
+void Perception::stage(double time, const Scan& scan, Monitor& monitor) {
   SensedPoints sensed;
   sense_(scan, sensed);
   Sensor& sensor = sensors_[static_cast<std::size_t>(scan.sensor)];
@@ -121,6 +123,10 @@ void Perception::stage(const Scan& scan, Monitor& monitor) {
     finding.count = sensed.invalid;
     monitor.add(finding);
   }
+  // A scan without one usable zone tells nothing: the sensor's last cloud stays, and its age grows.
+  if (sensed.invalid == kZones) return;
+  sensor.seen = true;
+  sensor.received = time;
   const Pose T_WS = posture_.T_WL[static_cast<std::size_t>(sensor.link)] * sensor.T_LS;
   sensor.n_raw = sensor.n_kept = 0;
   std::rotate(sensor.past.begin(), sensor.past.end() - 1, sensor.past.end());
@@ -221,7 +227,7 @@ double Perception::age(std::size_t sensor, double time) const {
 }
 
 void Perception::check_freshness(double time, const MonitorConfig& config, Monitor& monitor) const {
-  if (sensors_.empty()) return;
+  // A skin without sensors sees nothing: to the arm that is the same as silence.
   double youngest = kInfinity;
   for (std::size_t id = 0; id < sensors_.size(); ++id) {
     const double old = age(id, time);

@@ -15,7 +15,8 @@ class JointHistory {
   JointVector at(double time) const;
 
  private:
-  static constexpr std::size_t kKept = 64;
+  // Half a second at 1 kHz and more: scans older than that are refused.
+  static constexpr std::size_t kKept = 1024;
   std::array<double, kKept> time_{};
   std::array<JointVector, kKept> q_;
   std::size_t count_ = 0;  // ever pushed
@@ -50,7 +51,8 @@ class Perception {
   struct Sensor {
     int link = 0;
     Pose T_LS = Pose::Identity();
-    bool seen = false;
+    bool counted = false;  // a scan came, usable or not
+    bool seen = false;     // one with a usable zone came
     std::uint32_t counter = 0;
     double received = 0.0;
     int n_raw = 0, n_kept = 0;
@@ -62,7 +64,7 @@ class Perception {
   };
 
   bool accept(double time, double delay, const Scan& scan, Monitor& monitor);
-  void stage(const Scan& scan, Monitor& monitor);
+  void stage(double time, const Scan& scan, Monitor& monitor);
   void filter();
   void keep(Sensor& sensor, int begin, int end);
   bool confirmed(const Sensor& sensor, const std::array<double, kZones>& ranges, int zone,

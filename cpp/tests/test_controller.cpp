@@ -131,9 +131,13 @@ TEST(Controller, SilenceOfAllSensorsHoldsTheArmWithin200Milliseconds) {
                                   : std::vector<Scan>{};
     controller.tick(0.01 * i, q, batch, goal);
   }
-  EXPECT_EQ(controller.tick(1.0, q, {}, goal).mode, Mode::kRun);
-  Mode mode = Mode::kRun;
-  for (int i = 1; i <= 20; ++i) mode = controller.tick(0.98 + 0.01 * i, q, {}, goal).mode;
+  Mode mode = Mode::kRun;  // the last scan came at 0.98 s
+  for (int i = 100; i <= 118; ++i) {
+    mode = controller.tick(0.01 * i, q, {}, goal).mode;
+    if (i <= 111) {
+      EXPECT_EQ(mode, Mode::kRun);
+    }
+  }
   EXPECT_EQ(mode, Mode::kHold);
 }
 
@@ -211,12 +215,66 @@ TEST(Controller, AClockThatJumpsAnHourChangesNoCommand) {
   EXPECT_LT((run(-3600.0) - run(0.0)).norm(), 1e-6);
 }
 
+TEST(Controller, WhatNoZoneTellsIsUnknownNotFree) {
+  for (const bool nan : {true, false}) {
+    const auto robot = test::arm();
+    Controller controller(robot, test::ring(), ControllerConfig{});
+    Random random(16);
+    const JointVector q = bent();
+    const Pose goal = goal_near(*robot, q);
+    controller.tick(0.0, q, scans(random, 10, 0, 0.0), goal);
+    const Points before = controller.cloud_W();
+    Mode mode = Mode::kRun;
+    for (int i = 1; i <= 20; ++i) {
+      auto batch = scans(random, 10, static_cast<std::uint32_t>(i), 0.01 * i);
+      for (Scan& scan : batch) {
+        if (nan) scan.ranges.fill(std::nan(""));
+        if (!nan) scan.status.fill(4);
+      }
+      mode = controller.tick(0.01 * i, q, batch, goal).mode;
+    }
+    EXPECT_EQ(Points(controller.cloud_W()), before);
+    EXPECT_EQ(mode, Mode::kHold);
+  }
+}
+
+TEST(Controller, AScanOfLongAgoIsRefused) {
+  const auto robot = test::arm();
+  Controller controller(robot, test::ring(), ControllerConfig{});
+  Random random(17);
+  const JointVector q = bent();
+  const Pose goal = goal_near(*robot, q);
+  double time = 5.0;
+  for (const double stamp : {-kInfinity, 4.0, std::nan(""), 6.0}) {
+    time += 0.01;
+    controller.tick(time, q, scans(random, 10, 1, stamp), goal);
+    EXPECT_EQ(controller.cloud_W().rows(), 0);
+    EXPECT_EQ(controller.findings().front().reason, Reason::kScanRefused);
+  }
+}
+
+TEST(Controller, ASkinWithoutSensorsHoldsTheArm) {
+  const auto robot = test::arm();
+  Controller controller(robot, Skin{}, ControllerConfig{});
+  const JointVector q = bent();
+  const TickOutput& out = controller.tick(0.0, q, {}, goal_near(*robot, q));
+  EXPECT_EQ(out.mode, Mode::kHold);
+  EXPECT_EQ(out.qd, JointVector::Zero(6));
+  // What is missing of each task is judged by what is issued: here, all of it.
+  EXPECT_EQ(out.tasks[1].residual, out.tasks[1].rate);
+}
+
 TEST(Controller, RefusesContradictions) {
   const auto robot = test::arm();
   EXPECT_THROW(Controller(robot, test::ring(3, "no_such_link"), ControllerConfig{}), ModelError);
   ControllerConfig config;
   config.tasks.clear();
   EXPECT_THROW(Controller(robot, Skin{}, config), ConfigError);
+  config = ControllerConfig{};
+  config.avoid_links = {"link2", "link2"};
+  EXPECT_THROW(Controller(robot, Skin{}, config), ConfigError);
+  config = ControllerConfig{.control_point = ControlPoint::kSensor};
+  EXPECT_THROW(Controller(robot, test::ring(3, "link0"), config), ConfigError);
   config = ControllerConfig{};
   config.period = 0.0;
   EXPECT_THROW(Controller(robot, Skin{}, config), ConfigError);

@@ -38,7 +38,9 @@ TEST(MeshTree, NearestWithinABoundIsTheNearestOrNothing) {
         p, radius * radius, i % 2 == 0 ? -1 : i % static_cast<int>(tree.triangles().rows()));
     EXPECT_EQ(found.has_value(), expected < radius);
     EXPECT_EQ(tree.within(p, radius), expected < radius);
-    if (found) EXPECT_NEAR(std::sqrt(found->squared_distance), expected, 1e-12);
+    if (found) {
+      EXPECT_NEAR(std::sqrt(found->squared_distance), expected, 1e-12);
+    }
   }
 }
 

@@ -62,15 +62,20 @@ struct TaskReport {
 };
 
 struct Timings {
-  double sense_us = 0, filter_us = 0, distance_us = 0, solve_us = 0, total_us = 0;
+  double sense_us = 0, filter_us = 0;
+  double distance_us = 0;  ///< closest pair, control points, task rows
+  double solve_us = 0;     ///< solver and command
+  double total_us = 0;
 };
 
 /// Everything one tick tells. Reused: copy what you keep.
 struct TickOutput {
-  JointVector qd;                   ///< [rad/s] or [m/s] admissible velocity
-  std::optional<ClosestPair> pair;  ///< that drives the arm; its point is a row of `cloud_W`
-  PointOrigin pair_origin;          ///< sensor and zone that saw it, where one did
-  ControlPair control;              ///< what the first avoidance row acts on
+  JointVector qd;  ///< [rad/s] or [m/s] admissible velocity
+  /// Nearest of the links that joints can move away. In whole-body mode it drives the arm; its
+  /// point is a row of `cloud_W` (`tick`) or of the points given (`tick_known`).
+  std::optional<ClosestPair> pair;
+  PointOrigin pair_origin;  ///< sensor and zone that saw it, where one did
+  ControlPair control;      ///< what the first avoidance row acts on
   Mode mode = Mode::kRun;
   int n_tasks = 0;
   std::array<TaskReport, kMaxLevels> tasks;
@@ -104,7 +109,7 @@ class Controller {
   /// @name State of the last tick
   /// @{
   std::span<const Finding> findings() const;
-  Eigen::Map<const Points> cloud_W() const;  ///< filtered: what the arm avoids
+  Eigen::Map<const Points> cloud_W() const;  ///< filtered, of the sensors: what `tick` avoids
   std::span<const PointOrigin> cloud_origins() const;
   /// Every point of the sensors' last scans before body removal, in world.
   Eigen::Map<const Points> raw_cloud_W() const;

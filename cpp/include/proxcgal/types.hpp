@@ -77,7 +77,7 @@ enum class Reason : std::uint8_t {
   kZoneInvalid,         ///< not finite, not positive, or a status that is not valid
   kJointStateInvalid,   ///< not finite or of the wrong size
   kGoalInvalid,         ///< not finite or not a rigid pose
-  kTimeInvalid,         ///< not finite, or running backwards
+  kTimeInvalid,         ///< not finite, not later than the last, or over 0.5 s later
   kNoControllableLink,  ///< the nearest link cannot be moved away: its row n'J is too small
   kLinkSkipped,         ///< a nearer link was passed over because its row n'J is too small
   kRowSmall,            ///< a scalar task row had a norm under 0.01 before scaling
@@ -85,7 +85,7 @@ enum class Reason : std::uint8_t {
   kOutsideLimits,       ///< a joint is outside its position limits
   kDeadlineMissed,      ///< the caller's word
   kDeadlinesMissed,     ///< too many in a row
-  kPointsInvalid,       ///< known points not finite
+  kPointsInvalid,       ///< known points or their velocity not finite, or too many
 };
 
 /// One thing the monitor found in this tick.

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "proxcgal/error.hpp"
+#include "require.hpp"
 
 namespace proxcgal {
 namespace {
@@ -21,13 +21,8 @@ double zone_angle(int index, double field_of_view) {
 }  // namespace
 
 void SensorModel::validate() const {
-  const auto require = [](bool ok, const char* field, double value, const char* allowed) {
-    if (!ok) {
-      throw ConfigError(std::string("sensor model: ") + field + " is " + std::to_string(value) +
-                        ", allowed is " + allowed);
-    }
-  };
-  require(field_of_view > 0.0 && field_of_view < 3.0, "field_of_view", field_of_view, "0 to 3 rad");
+  require(field_of_view > 0.0 && field_of_view < 3.0, "field_of_view", field_of_view,
+          "above 0 and below 3 rad");
   require(min_range >= 0.0, "min_range", min_range, "0 m or more");
   require(std::isfinite(max_range) && max_range > min_range, "max_range", max_range,
           "above min_range [m]");

@@ -2,25 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
 
-#include "proxcgal/error.hpp"
+#include "require.hpp"
 
 namespace proxcgal {
 
 void MonitorConfig::validate() const {
-  const auto require = [](bool ok, const char* field, double value, const char* allowed) {
-    if (!ok) {
-      throw ConfigError(std::string("monitor: ") + field + " is " + std::to_string(value) +
-                        ", allowed is " + allowed);
-    }
-  };
-  require(degraded_after > 0.0, "degraded_after", degraded_after, "above 0 s");
-  require(hold_after > 0.0, "hold_after", hold_after, "above 0 s");
-  require(degraded_scale >= 0.0 && degraded_scale <= 1.0, "degraded_scale", degraded_scale,
+  require(degraded_after > 0.0, "monitor.degraded_after", degraded_after, "above 0 s");
+  require(hold_after > 0.0, "monitor.hold_after", hold_after, "above 0 s");
+  require(degraded_scale >= 0.0 && degraded_scale <= 1.0, "monitor.degraded_scale", degraded_scale,
           "0 to 1");
-  require(clean_cycles >= 1, "clean_cycles", clean_cycles, "1 or more");
-  require(missed_deadlines >= 1, "missed_deadlines", missed_deadlines, "1 or more");
+  require(clean_cycles >= 1, "monitor.clean_cycles", clean_cycles, "1 or more");
+  require(missed_deadlines >= 1, "monitor.missed_deadlines", missed_deadlines, "1 or more");
 }
 
 Mode mode_of(Reason reason) {

@@ -1,0 +1,30 @@
+#include <cmath>
+
+#include "proxcgal/controller.hpp"
+#include "require.hpp"
+
+namespace proxcgal {
+
+void FilterConfig::validate() const {
+  require(std::isfinite(tolerance) && tolerance >= 0.0, "filter.tolerance", tolerance,
+          "0 m or more");
+  require(std::isfinite(sigmas) && sigmas >= 0.0, "filter.sigmas", sigmas, "0 or more");
+  require(std::isfinite(min_hit) && min_hit >= 0.0, "filter.min_hit", min_hit, "0 m or more");
+  require(!std::isnan(z_min) && z_min < kInfinity, "filter.z_min", z_min,
+          "a height [m], -inf for no crop");
+}
+
+void ControllerConfig::validate() const {
+  require(!tasks.empty() && tasks.size() <= kMaxLevels, "tasks", tasks.size(),
+          "1 to " + std::to_string(kMaxLevels) + " in number");
+  for (const TaskSpec& task : tasks) proxcgal::validate(task);
+  filter.validate();
+  solver.validate();
+  monitor.validate();
+  require(period > 0.0 && period <= 0.5, "period", period, "above 0 and at most 0.5 s");
+  require(min_row_norm >= 0.0 && min_row_norm < 1.0, "min_row_norm", min_row_norm,
+          "at least 0 and below 1");
+  require(max_points >= 1, "max_points", max_points, "1 or more");
+}
+
+}  // namespace proxcgal
