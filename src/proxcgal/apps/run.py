@@ -94,10 +94,12 @@ def run_command(options: RunOptions, command: str) -> int:
 
 def overrides(options: RunOptions) -> list[str]:
     """Assignments of all options that change the scenario; --set comes last and wins."""
+    from proxcgal.models.paths import is_robot_file
+
     changes = []
     if options.robot is not None:
         path = Path(options.robot).expanduser()
-        is_file = path.suffix in (".urdf", ".xml")
+        is_file = is_robot_file(path)
         changes.append("robot=" + json.dumps(str(path.absolute()) if is_file else options.robot))
     folders = [str(path.expanduser().absolute()) for path in flat(options.package_dir)]
     if folders:

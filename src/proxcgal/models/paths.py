@@ -12,6 +12,13 @@ from proxcgal.errors import ModelError
 # A description may sit in such a folder of its package, with the meshes beside that folder.
 _DESCRIPTION_FOLDERS = {"urdf", "xacro", "robots", "robot", "mjcf", "xml", "model", "models"}
 
+SUFFIXES = (".urdf", ".xacro", ".xml", ".mjcf")
+
+
+def is_robot_file(name: str | os.PathLike[str]) -> bool:
+    """Whether a robot's name is a path to its description, by the ending."""
+    return Path(name).suffix.lower() in SUFFIXES
+
 
 class MeshFolders:
     """Finds files named in a description. Nothing outside of its folders is ever opened.

@@ -11,12 +11,11 @@ from proxcgal.errors import ModelError
 from proxcgal.models import mjcf, urdf
 from proxcgal.models.cache import Cache
 from proxcgal.models.description import RobotDescription
-from proxcgal.models.paths import MeshFolders
+from proxcgal.models.paths import SUFFIXES, MeshFolders, is_robot_file
 from proxcgal.models.reading import WORLD, describe
 from proxcgal.models.safe_xml import parse_xml
 from proxcgal.models.stored import description_from, description_to
 
-SUFFIXES = (".urdf", ".xacro", ".xml", ".mjcf")
 # Bump when what is read from the same files changes.
 _VERSION = 1
 
@@ -41,7 +40,7 @@ def read_description(
         GeometryError: a mesh that cannot be used, with its file and face.
     """
     path = Path(os.path.normpath(Path(path).absolute()))
-    if path.suffix.lower() not in SUFFIXES:
+    if not is_robot_file(path):
         raise ModelError(f"{path}: {', '.join(SUFFIXES)} are read, not '{path.suffix}'")
     folders = MeshFolders(path, package_dirs, packages)
     cache = Cache("description")

@@ -17,7 +17,8 @@ from proxcgal.models.builtin import BUILTIN, list_robots
 from proxcgal.models.cache import hash_mesh
 from proxcgal.models.description import RobotDescription, listed
 from proxcgal.models.limits import PerJoint, with_limits
-from proxcgal.models.read import SUFFIXES, read_description
+from proxcgal.models.paths import SUFFIXES, is_robot_file
+from proxcgal.models.read import read_description
 from proxcgal.models.resolution import COUNT_TOLERANCE, ControlMesh, control_mesh
 from proxcgal.models.triangles import Floats, Ints
 
@@ -206,9 +207,9 @@ def control_meshes(
 
 def _file(name_or_path: str | os.PathLike[str]) -> Path:
     path = Path(name_or_path)
-    if path.suffix.lower() in SUFFIXES and path.is_file():
+    if is_robot_file(path) and path.is_file():
         return path
     known = f"known by name are {listed(BUILTIN)}; a path to {', '.join(SUFFIXES)} works as well"
-    if path.suffix.lower() in SUFFIXES:
+    if is_robot_file(path):
         raise ModelError(f"{path}: no such file; {known}")
     raise ModelError(f"robot '{name_or_path}' is not known; {known}")

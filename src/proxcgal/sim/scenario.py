@@ -10,6 +10,7 @@ from typing import Any, Literal
 from pydantic import Field, ValidationError
 
 from proxcgal.errors import ConfigError
+from proxcgal.models.paths import is_robot_file
 from proxcgal.sim import toml
 from proxcgal.sim.scenario_keys import (
     Fault,
@@ -129,7 +130,7 @@ def _built_in() -> list[Path]:
 def _anchor(table: dict[str, Any], folder: Path) -> None:
     """Paths in a file are relative to that file, wherever it is read from."""
     robot = table.get("robot")
-    if isinstance(robot, str) and Path(robot).suffix in (".urdf", ".xml"):
+    if isinstance(robot, str) and is_robot_file(robot):
         table["robot"] = str((folder / robot).absolute())
     places = table.get("package_dirs")
     if isinstance(places, list) and all(isinstance(place, str) for place in places):

@@ -43,14 +43,22 @@ Size = Annotated[tuple[Positive, ...], Field(min_length=3, max_length=3)]
 Bound = Annotated[float, Field(allow_inf_nan=True), AfterValidator(_not_nan)]
 
 
-def like(struct: str, attribute: str, description: str) -> Any:
-    """A field whose default is that of the core's struct."""
+def like(
+    struct: str,
+    attribute: str,
+    description: str,
+    *,
+    ge: int | None = None,
+    le: int | None = None,
+    lt: int | None = None,
+) -> Any:
+    """A field whose default is that of the core's struct; bounds as pydantic names them."""
 
     def default() -> Any:
         value = getattr(getattr(_core, struct)(), attribute)
         return tuple(value) if isinstance(value, list) else value
 
-    return Field(default_factory=default, description=description)
+    return Field(default_factory=default, description=description, ge=ge, le=le, lt=lt)
 
 
 class Section(BaseModel):
@@ -128,7 +136,7 @@ class Skin(Section):
 class Simulation(Section):
     """Rates, and what the simulated sensors really do."""
 
-    control_hz: Positive = Field(100.0, description="ticks a second")
+    control_hz: Positive = Field(100.0, ge=2, description="ticks a second")
     sensor_hz: Positive = Field(15.0, description="scans of each sensor a second")
     stagger: bool = Field(False, description="sensors take turns instead of measuring at once")
     known_spacing: Positive = Field(

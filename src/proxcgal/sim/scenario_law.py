@@ -42,8 +42,10 @@ class Solver(Section):
     """The task-priority solver."""
 
     damping: NonNegative = like("SolverConfig", "damping", "lambda")
-    damping_threshold: NonNegative = like(
-        "SolverConfig", "damping_threshold", "s_th; singular values below are damped"
+    damping_threshold: Positive = like(
+        "SolverConfig",
+        "damping_threshold",
+        "s_th; eigenvalues of X'AX below are damped: singular values below its square root",
     )
     eta: NonNegative = like("SolverConfig", "eta", "cost of leaving the upper levels' freedom")
     form: Literal["literal", "code"] = like("SolverConfig", "form", "of the damped inverse")
@@ -91,6 +93,16 @@ class Manipulability(Section):
     low: Positive = like("Manipulability", "low", "fully active below")
     high: Positive = like("Manipulability", "high", "inactive above")
     gain: Positive = like("Manipulability", "gain", "[1/s]")
+    first_joint: int = like(
+        "Manipulability", "first_joint", "of the arm that is meant, from 0", ge=0
+    )
+    joints: int = like("Manipulability", "joints", "of that arm; 0: all from the first on", ge=0)
+
+    @model_validator(mode="after")
+    def _low_below_high(self) -> Self:
+        if self.low >= self.high:
+            raise ValueError(f"low is {self.low} and high {self.high}: low must be below high")
+        return self
 
 
 class Controller(Section):
@@ -99,7 +111,7 @@ class Controller(Section):
     d_min: Positive = like("Avoidance", "d_min", "[m] distance to keep")
     buffer: Positive = like("Avoidance", "buffer", "[m] Delta: avoidance fades in over it")
     avoid_gain: Positive = like("Avoidance", "gain", "[1/s] lambda of avoidance")
-    nearest: Count = like("Avoidance", "nearest", "this many nearest links, one row each")
+    nearest: Count = like("Avoidance", "nearest", "this many nearest links, one row each", le=32)
     reach_gain: Positive = like("Reach", "gain", "[1/s] lambda of reaching")
     max_linear: Positive = like("Reach", "max_linear", "[m/s] of reaching")
     max_angular: Positive = like("Reach", "max_angular", "[rad/s] of reaching")
@@ -107,7 +119,10 @@ class Controller(Section):
         ("avoidance", "reach"), min_length=1, description="their order is their priority"
     )
     min_row_norm: NonNegative = like(
-        "ControllerConfig", "min_row_norm", "a link that joints move less than this is passed over"
+        "ControllerConfig",
+        "min_row_norm",
+        "a link that joints move less than this is passed over",
+        lt=1,
     )
     avoid_links: tuple[str, ...] = like(
         "ControllerConfig", "avoid_links", "links to keep away; empty: all that some joint moves"
