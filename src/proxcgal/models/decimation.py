@@ -49,7 +49,7 @@ _FIRST_TOLERANCE = 0.002
 _STRICT_TOLERANCE = 0.008
 # Spacing of the samples that hold the tolerance [m], and how many there may be on the old surface.
 _SPACING = 0.004
-_MOST_SAMPLES = 20_000
+_MOST_SAMPLES = 40_000
 
 
 class _Surface:
