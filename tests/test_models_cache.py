@@ -8,6 +8,8 @@ import pytest
 
 import proxcgal as px
 from proxcgal.models import cache, read, resolution
+from proxcgal.models.meshes import box
+from proxcgal.models.subdivision import subdivide
 
 OBJ = "v 0 0 0\nv {x} 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 
@@ -76,13 +78,9 @@ def test_a_changed_description_is_noticed(home: Path, description: Path) -> None
 
 
 def test_settings_have_entries_of_their_own(home: Path) -> None:
-    sphere = resolution.control_mesh
-    from proxcgal.models.meshes import ellipsoid
-
-    v, f = ellipsoid(np.full(3, 0.2))
-    counts = {len(sphere(v, f, n, d).vertices_L) for n, d in ((100, np.inf), (300, np.inf),
-                                                             (100, 0.002))}  # fmt: skip
-    assert len(counts) == 3
+    v, f = subdivide(*box(np.array([0.1, 0.1, 0.2])), 300)
+    for count, bound in ((100, np.inf), (200, np.inf), (100, 0.002), (100, 0.002)):
+        resolution.control_mesh(v, f, count, bound)
     assert len(list((home / "proxcgal" / "control").iterdir())) == 3
 
 

@@ -128,9 +128,9 @@ double Bvh::trace(const Vector3& origin, const Vector3& direction, double t_min,
     near_origin[k] = splat(inv >= 0.0F ? o + e : o - e);
     far_origin[k] = splat(inv >= 0.0F ? o - e : o + e);
   }
-  constexpr float kSlack = 1e-6F;
+  constexpr float slack = 1e-6F;
   const auto begin = static_cast<float>(t_min);
-  const float t_low = begin - kSlack * std::abs(begin);
+  const float t_low = begin - slack * std::abs(begin);
   double best = t_max;
   Entry stack[kStack];
   int top = 0;
@@ -156,8 +156,8 @@ double Bvh::trace(const Vector3& origin, const Vector3& direction, double t_min,
       leave = min4(leave, ((forward ? node.high[k] : node.low[k]) - far_origin[k]) * inverse[k]);
     }
     const Float4 size = max4(enter, -enter);
-    enter -= size * splat(kSlack);
-    leave += max4(leave, -leave) * splat(kSlack);
+    enter -= size * splat(slack);
+    leave += max4(leave, -leave) * splat(slack);
     Float4 key;
     for (int lane = 0; lane < kWide; ++lane)
       key[lane] = enter[lane] <= leave[lane] ? enter[lane] : INFINITY;
