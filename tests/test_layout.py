@@ -26,6 +26,7 @@ CPP_LAYER_OF = {
     "perception": "controller",
     "control_points": "controller",
     "controller": "controller",
+    "controller_config": "controller",
     "admittance": "controller",
     "python": "bindings",
 }
