@@ -43,6 +43,8 @@ _MIN_ASPECT = 0.02
 _CANDIDATES = 0.3
 _TAKEN = 0.6
 _PASSES = 3
+# Share of the vertices that a round must take to go on with a tolerance that may be widened.
+_WORTHWHILE = 0.01
 # Where any tolerance goes, as small a one as will do is looked for from here, by doubling [m].
 _FIRST_TOLERANCE = 0.002
 # Past this one, small parts and the topology are given up first [m].
@@ -71,8 +73,8 @@ class _Surface:
             self.samples, self.home = sample(vertices, triangles, spacing)
         self.Q, self.on_rim = surface_quadrics(vertices, self.f)
 
-    def round(self, count: int) -> int:
-        """One round of independent collapses; returns how many were tried."""
+    def round(self, count: int) -> tuple[int, int]:
+        """One round of independent collapses; returns how many were tried, and done."""
         n = len(self.v)
         edges, faces_on_edge = edges_of(self.f, n)
         place, key = self._placements(edges, faces_on_edge)
@@ -94,7 +96,7 @@ class _Surface:
         else:
             tried = len(rows)
         self._collapse(edges[rows], place[rows])
-        return tried
+        return tried, len(rows)
 
     def loosen(self, size: float) -> None:
         """Allow twice the tolerance; when that has not helped, parts may go, small ones first."""
@@ -278,14 +280,17 @@ def decimate(
     surface = _Surface(vertices, triangles, tolerance if bounded else _FIRST_TOLERANCE)
     size = float(np.ptp(vertices, axis=0).max())
     while surface.count > count:
-        if surface.round(count):
+        tried, done = surface.round(count)
+        # Where the tolerance is free, there is no need to wring out the last that it allows.
+        if tried and (bounded or done >= _WORTHWHILE * surface.count):
             continue
         if surface.share < 1:  # none of the cheap ones will do: look at all
             surface.share = 1.0
             continue
-        if bounded or not np.isfinite(surface.tolerance):
+        if np.isfinite(surface.tolerance) and not bounded:
+            surface.loosen(size)
+        elif not done:
             break
-        surface.loosen(size)
     return compact(surface.v, surface.f)
 
 
