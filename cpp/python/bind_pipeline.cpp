@@ -1,7 +1,11 @@
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/tuple.h>
 
+#include <algorithm>
+#include <limits>
 #include <memory>
+#include <optional>
 
 #include "named_pair.hpp"
 #include "proxcgal/pipeline/distance.hpp"
@@ -39,6 +43,7 @@ nb::object remove_body_all(const Robot& robot, nb::handle q, nb::handle origins,
   const Method how = choice(method, "method", kMethods);
   const Posture posture = posture_at(robot, q);
   auto* keep = new bool[static_cast<std::size_t>(n)];
+  std::fill_n(keep, n, true);
   const nb::capsule owner(keep, [](void* p) noexcept { delete[] static_cast<bool*>(p); });
   {
     const nb::gil_scoped_release release;
@@ -49,14 +54,17 @@ nb::object remove_body_all(const Robot& robot, nb::handle q, nb::handle origins,
   return nb::cast(nb::ndarray<nb::numpy, bool>(keep, {static_cast<std::size_t>(n)}, owner));
 }
 
+constexpr std::int64_t kAnySteps = std::numeric_limits<std::int64_t>::max();
+
 NamedPair closest_pair_all(const Robot& robot, nb::handle q, nb::handle points,
-                           const std::string& method) {
+                           const std::string& method, std::optional<std::int64_t> steps) {
   const PointsArgument points_W(points, "points_W");
   require_rows(points_W(), "points_W");
   const Method how = choice(method, "method", kMethods);
   const Posture posture = posture_at(robot, q);
   const nb::gil_scoped_release release;
-  return named(robot, closest_pair(robot, posture, points_W(), how));
+  return named(robot,
+               closest_pair(robot, posture, points_W(), how, {.steps = steps.value_or(kAnySteps)}));
 }
 
 std::vector<NamedPair> closest_pairs_all(const Robot& robot, nb::handle q, nb::handle points) {
@@ -66,7 +74,7 @@ std::vector<NamedPair> closest_pairs_all(const Robot& robot, nb::handle q, nb::h
   std::vector<ClosestPair> pairs(static_cast<std::size_t>(robot.n_links()));
   {
     const nb::gil_scoped_release release;
-    closest_pairs(robot, posture, points_W(), {}, pairs);
+    closest_pairs(robot, posture, points_W(), {}, pairs, kAnySteps);
   }
   std::vector<NamedPair> out;
   for (const ClosestPair& pair : pairs) out.push_back(named(robot, pair));
@@ -221,6 +229,9 @@ void bind_pipeline(nanobind::module_& m) {
                         "The nearest obstacle point and the robot surface point nearest to it.")
       .def_prop_ro(
           "distance", [](const NamedPair& p) { return p.pair.distance; }, "[m], unsigned.")
+      .def_prop_ro(
+          "lower_bound", [](const NamedPair& p) { return p.pair.lower_bound; },
+          "The search was cut short: the true distance is at least `distance`.")
       .def_ro("link", &NamedPair::link, "Name of the link; empty where there is no pair.")
       .def_prop_ro(
           "surface_W", [](const NamedPair& p) { return p.pair.surface_W; },
@@ -249,7 +260,11 @@ void bind_pipeline(nanobind::module_& m) {
       "'paper' for the literal algorithm.\n\n"
       "Raises:\n    GeometryError: wrong shape, or not finite.");
   m.def("closest_pair", &closest_pair_all, "robot"_a, "q"_a, "points_W"_a, "method"_a = "fast",
+        "steps"_a = nb::none(),
         "Algorithm 2 of [WA], over all links: the nearest (cloud point, surface point).\n\n"
+        "Args:\n    method: 'fast', or 'paper' for the literal algorithm.\n    steps: of 'fast', "
+        "tree nodes and leaves that it may look at, as a tick does; past them the\n"
+        "        distance is a lower bound, and marked so. None: as many as it takes.\n\n"
         "Raises:\n    GeometryError: empty cloud, wrong shape, or not finite.");
   m.def("closest_pairs", &closest_pairs_all, "robot"_a, "q"_a, "points_W"_a,
         "The nearest pair of each link, in the order of link_names.");

@@ -60,25 +60,63 @@ ControlPoints::ControlPoints(const Robot& robot, const Skin& skin, const Control
         "controller: control_point is 'sensor', but the skin has no sensor on a link that a joint "
         "moves");
   }
-  candidates_.reserve(links_.size());
+  passed_.reserve(links_.size());
+  passed_over_.assign(static_cast<std::size_t>(robot.n_links()), false);
   per_link_.resize(links_.size());
+  sorted_.reserve(links_.size());
   chosen_.reserve(std::max<std::size_t>(links_.size(), 1));
 }
 
 std::optional<ClosestPair> ControlPoints::nearest(const Robot& robot, const Posture& posture,
                                                   const PointsRef& cloud_W, double engaged_within,
                                                   Monitor& monitor) {
-  candidates_.assign(links_.begin(), links_.end());
-  ClosestPair skipped;  // the nearest of those passed over
-  while (!candidates_.empty()) {
-    const ClosestPair pair = closest_pair(robot, posture, cloud_W, method_, candidates_);
-    if (!pair.found()) return std::nullopt;
-    if (row_norm(robot, posture, control_of(pair, Vector3::Zero())) >= min_row_norm_) return pair;
-    note(monitor, Reason::kLinkSkipped, pair.link);
-    if (!skipped.found()) skipped = pair;
-    candidates_.erase(std::find(candidates_.begin(), candidates_.end(), pair.link));
+  const auto controllable = [&](const ClosestPair& pair) {
+    return row_norm(robot, posture, control_of(pair, Vector3::Zero())) >= min_row_norm_;
+  };
+  // What was passed over a moment ago most likely will be again: the others are asked first.
+  ClosestPair best;
+  const auto first_passed = std::partition(links_.begin(), links_.end(), [&](int link) {
+    return !passed_over_[static_cast<std::size_t>(link)];
+  });
+  auto asked_end = first_passed;
+  passed_.clear();
+  while (asked_end != links_.begin()) {
+    const std::span<const int> asked(links_.begin(), asked_end);
+    best = closest_pair(robot, posture, cloud_W, method_, {.links = asked, .before = before_});
+    if (!best.found()) return std::nullopt;
+    if (controllable(best)) break;
+    passed_.push_back(best);
+    best = {};
+    std::iter_swap(std::find(links_.begin(), asked_end, passed_.back().link), --asked_end);
   }
-  if (skipped.distance < engaged_within) note(monitor, Reason::kNoControllableLink, skipped.link);
+  for (auto link = first_passed; link != links_.end(); ++link) {
+    ClosestPair& before = per_link_[static_cast<std::size_t>(link - links_.begin())];
+    const ClosestPair nearer =
+        closest_pair(robot, posture, cloud_W, method_,
+                     {.links = std::span(&*link, 1), .before = before, .within = best.distance});
+    before = nearer;
+    if (!nearer.found()) continue;
+    if (controllable(nearer)) {
+      best = nearer;
+    } else {
+      passed_.push_back(nearer);
+    }
+  }
+  std::fill(passed_over_.begin(), passed_over_.end(), false);
+  double nearest_passed = kInfinity;
+  int link_passed = -1;
+  for (const ClosestPair& pair : passed_) {
+    passed_over_[static_cast<std::size_t>(pair.link)] = true;
+    if (!(pair.distance < best.distance)) continue;
+    note(monitor, Reason::kLinkSkipped, pair.link);
+    if (!(pair.distance < nearest_passed)) continue;
+    nearest_passed = pair.distance;
+    link_passed = pair.link;
+  }
+  before_ = best;
+  if (best.lower_bound) note(monitor, Reason::kDistanceBounded, best.link);
+  if (best.found()) return best;
+  if (nearest_passed < engaged_within) note(monitor, Reason::kNoControllableLink, link_passed);
   return std::nullopt;
 }
 
@@ -113,9 +151,10 @@ std::span<const ControlPair> ControlPoints::links(const Robot& robot, const Post
                                                   const Vector3& velocity_W) {
   chosen_.clear();
   closest_pairs(robot, posture, cloud_W, links_, per_link_);
-  std::sort(per_link_.begin(), per_link_.end(),
+  sorted_.assign(per_link_.begin(), per_link_.end());
+  std::sort(sorted_.begin(), sorted_.end(),
             [](const auto& x, const auto& y) { return x.distance < y.distance; });
-  for (const ClosestPair& pair : per_link_) {
+  for (const ClosestPair& pair : sorted_) {
     if (static_cast<int>(chosen_.size()) == count || !pair.found()) break;
     const ControlPair control = control_of(pair, velocity_W);
     if (row_norm(robot, posture, control) >= min_row_norm_) chosen_.push_back(control);

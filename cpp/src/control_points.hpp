@@ -34,10 +34,12 @@ class ControlPoints {
  private:
   Method method_;
   double min_row_norm_;
-  std::vector<int> links_;        // rows of the links that count
-  std::vector<int> candidates_;   // those of them not passed over yet
+  std::vector<int> links_;         // rows of the links that count, the passed over ones last
+  std::vector<char> passed_over_;  // [link] was it a moment ago, because its row was too small
+  std::vector<ClosestPair> passed_;
   std::vector<int> sensor_link_;  // row of each sensor's link, -1 where no joint moves it
-  std::vector<ClosestPair> per_link_;
+  ClosestPair before_;            // the last that was returned: where the next search begins
+  std::vector<ClosestPair> per_link_, sorted_;
   std::vector<ControlPair> chosen_;
 };
 

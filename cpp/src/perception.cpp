@@ -93,9 +93,7 @@ void Perception::update(double time, double delay, const JointVector& q,
     Stopwatch watch(timings);
     if (!accept(time, delay, scan, monitor)) continue;
     // One filter call for all scans of one stamp; a sensor twice in a batch needs two.
-    const bool repeated = std::find(staged_.sensor.begin(), staged_.sensor.begin() + staged_.count,
-                                    scan.sensor) != staged_.sensor.begin() + staged_.count;
-    if (scan.stamp != placed || repeated) {
+    if (scan.stamp != placed || sensors_[static_cast<std::size_t>(scan.sensor)].staged) {
       sense_us += watch.lap_us();
       filter();
       filter_us += watch.lap_us();
@@ -127,10 +125,13 @@ void Perception::stage(double time, const Scan& scan, Monitor& monitor) {
   if (sensed.invalid == kZones) return;
   sensor.seen = true;
   sensor.received = time;
+  const Eigen::Index before = staged_.count;
   const Pose T_WS = posture_.T_WL[static_cast<std::size_t>(sensor.link)] * sensor.T_LS;
   sensor.n_raw = sensor.n_kept = 0;
-  std::rotate(sensor.past.begin(), sensor.past.end() - 1, sensor.past.end());
-  sensor.past[0].fill(kInfinity);
+  if (config_.confirmation != Confirmation::kOff) {
+    std::rotate(sensor.past.begin(), sensor.past.end() - 1, sensor.past.end());
+    sensor.past[0].fill(kInfinity);
+  }
   for (int i = 0; i < sensed.count; ++i) {
     const auto from = static_cast<std::size_t>(i);
     const Vector3 point_W = T_WS * sensed.point_S[from];
@@ -139,13 +140,14 @@ void Perception::stage(double time, const Scan& scan, Monitor& monitor) {
     const auto row = static_cast<std::size_t>(staged_.count);
     staged_.sensor[row] = scan.sensor;
     staged_.zone[row] = sensed.zone[from];
-    staged_.range[row] = sensed.point_S[from].norm();
+    staged_.range[row] = sensed.range[from];
     staged_.tolerance[row] =
         std::max(config_.tolerance, config_.sigmas * sensed.sigma[from]) + mesh_error_;
     staged_.origins_W.row(staged_.count) = T_WS.translation().transpose();
     staged_.points_W.row(staged_.count) = point_W.transpose();
     ++staged_.count;
   }
+  sensor.staged = staged_.count > before;
 }
 
 void Perception::filter() {
@@ -154,15 +156,21 @@ void Perception::filter() {
   const std::span<bool> keep_mask(staged_.keep.get(), n);
   const std::span<const double> tolerance(staged_.tolerance.data(), n);
   const auto points = staged_.points_W.topRows(staged_.count);
-  remove_body(*robot_, posture_, staged_.origins_W.topRows(staged_.count), points, tolerance,
-              config_.min_hit, method_, keep_mask);
+  std::fill(keep_mask.begin(), keep_mask.end(), true);
   if (config_.surface_margin) remove_near_surface(*robot_, posture_, points, tolerance, keep_mask);
+  // Algorithm 1 drops only points that lie within their tolerance of a surface: where the margin
+  // has dropped all of those, it finds nothing more, and only the literal form is asked still.
+  if (!config_.surface_margin || method_ == Method::kPaper) {
+    remove_body(*robot_, posture_, staged_.origins_W.topRows(staged_.count), points, tolerance,
+                config_.min_hit, method_, keep_mask);
+  }
   // Rows of one sensor stand together.
   for (int begin = 0; begin < static_cast<int>(n);) {
     const int id = staged_.sensor[static_cast<std::size_t>(begin)];
     int end = begin;
     while (end < static_cast<int>(n) && staged_.sensor[static_cast<std::size_t>(end)] == id) ++end;
     keep(sensors_[static_cast<std::size_t>(id)], begin, end);
+    sensors_[static_cast<std::size_t>(id)].staged = false;
     begin = end;
   }
   staged_.count = 0;
@@ -170,7 +178,7 @@ void Perception::filter() {
 
 void Perception::keep(Sensor& sensor, int begin, int end) {
   std::array<double, kZones>& ranges = sensor.past[0];
-  for (int i = begin; i < end; ++i) {
+  for (int i = begin; config_.confirmation != Confirmation::kOff && i < end; ++i) {
     const auto row = static_cast<std::size_t>(i);
     if (staged_.keep[row]) ranges[static_cast<std::size_t>(staged_.zone[row])] = staged_.range[row];
   }
@@ -210,16 +218,23 @@ bool Perception::confirmed(const Sensor& sensor, const std::array<double, kZones
 }
 
 void Perception::gather() {
-  n_cloud_ = n_raw_ = 0;
+  n_cloud_ = 0;
   for (int id = 0; id < sensors(); ++id) {
     const Sensor& sensor = sensors_[static_cast<std::size_t>(id)];
-    for (int i = 0; i < sensor.n_raw; ++i)
-      raw_.row(n_raw_++) = sensor.raw_W[static_cast<std::size_t>(i)].transpose();
     for (int i = 0; i < sensor.n_kept; ++i) {
       origins_[static_cast<std::size_t>(n_cloud_)] = {id, sensor.zone[static_cast<std::size_t>(i)]};
       cloud_.row(n_cloud_++) = sensor.kept_W[static_cast<std::size_t>(i)].transpose();
     }
   }
+}
+
+Eigen::Map<const Points> Perception::raw_cloud_W() const {
+  Eigen::Index n = 0;
+  for (const Sensor& sensor : sensors_) {
+    for (int i = 0; i < sensor.n_raw; ++i)
+      raw_.row(n++) = sensor.raw_W[static_cast<std::size_t>(i)].transpose();
+  }
+  return {raw_.data(), n, 3};
 }
 
 double Perception::age(std::size_t sensor, double time) const {

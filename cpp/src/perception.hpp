@@ -41,7 +41,8 @@ class Perception {
   std::span<const PointOrigin> origins() const {
     return {origins_.data(), static_cast<std::size_t>(n_cloud_)};
   }
-  Eigen::Map<const Points> raw_cloud_W() const { return {raw_.data(), n_raw_, 3}; }
+  /// Gathered when asked for: no tick needs it.
+  Eigen::Map<const Points> raw_cloud_W() const;
   double age(std::size_t sensor, double time) const;  ///< [s] since receipt
   int sensors() const { return static_cast<int>(sensors_.size()); }
   double sense_us = 0, filter_us = 0;  ///< of the last update, where timings are on
@@ -53,6 +54,7 @@ class Perception {
     Pose T_LS = Pose::Identity();
     bool counted = false;  // a scan came, usable or not
     bool seen = false;     // one with a usable zone came
+    bool staged = false;   // one waits for the filter
     std::uint32_t counter = 0;
     double received = 0.0;
     int n_raw = 0, n_kept = 0;
@@ -88,9 +90,10 @@ class Perception {
     std::unique_ptr<bool[]> keep;
     Eigen::Index count = 0;
   } staged_;
-  Points cloud_, raw_;
+  Points cloud_;
+  mutable Points raw_;
   std::vector<PointOrigin> origins_;
-  Eigen::Index n_cloud_ = 0, n_raw_ = 0;
+  Eigen::Index n_cloud_ = 0;
 };
 
 }  // namespace proxcgal::detail

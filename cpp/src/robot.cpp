@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <future>
 #include <kdl/segment.hpp>
 
 #include "proxcgal/error.hpp"
@@ -67,6 +68,25 @@ void check(const RobotSpec& spec) {
     bad("tool '" + spec.tool + "'", "its joint does not exist");
 }
 
+/// The links' trees, built side by side.
+std::vector<MeshTree> trees_of(const RobotSpec& spec) {
+  std::vector<std::future<MeshTree>> building;
+  for (const LinkSpec& link : spec.links) {
+    building.push_back(std::async(std::launch::async,
+                                  [&link] { return MeshTree(link.vertices_L, link.triangles); }));
+  }
+  std::vector<MeshTree> trees;
+  for (std::size_t i = 0; i < building.size(); ++i) {
+    try {
+      trees.push_back(building[i].get());
+    } catch (const GeometryError& error) {
+      throw GeometryError("robot '" + spec.name + "', link '" + spec.links[i].name +
+                          "': " + error.what());
+    }
+  }
+  return trees;
+}
+
 }  // namespace
 
 struct Robot::Impl {
@@ -117,15 +137,8 @@ Robot::Robot(RobotSpec spec) : impl_(std::make_unique<Impl>()) {
     me.qd_max[j] = joint.qd_max;
     me.qdd_max[j] = joint.qdd_max;
   }
-  for (const LinkSpec& link : me.spec.links) {
-    try {
-      me.trees.emplace_back(link.vertices_L, link.triangles);
-    } catch (const GeometryError& error) {
-      throw GeometryError("robot '" + me.spec.name + "', link '" + link.name +
-                          "': " + error.what());
-    }
-    me.chain_of_link.push_back(me.chain(link.joint));
-  }
+  me.trees = trees_of(me.spec);
+  for (const LinkSpec& link : me.spec.links) me.chain_of_link.push_back(me.chain(link.joint));
   me.chain_of_tool = me.chain(me.spec.tool_joint);
 }
 Robot::~Robot() = default;

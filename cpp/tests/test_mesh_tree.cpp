@@ -34,8 +34,7 @@ TEST(MeshTree, NearestWithinABoundIsTheNearestOrNothing) {
     const Vector3 p = random.vector(0.5);
     const double radius = random.uniform(0.0, 0.4);
     const double expected = std::sqrt(tree.reference_squared_distance(p));
-    const auto found = tree.nearest(
-        p, radius * radius, i % 2 == 0 ? -1 : i % static_cast<int>(tree.triangles().rows()));
+    const auto found = tree.nearest(p, radius * radius);
     EXPECT_EQ(found.has_value(), expected < radius);
     EXPECT_EQ(tree.within(p, radius), expected < radius);
     if (found) {
@@ -114,6 +113,36 @@ TEST(MeshTree, DistanceOfSurfacesIsNeverMoreThanBetweenTheirPoints) {
     EXPECT_NEAR(other.nearest(there)->squared_distance, 0.0, 1e-18);
     EXPECT_NEAR(other.distance(tree, T.inverse()), d, 1e-12);
   }
+}
+
+TEST(MeshTree, ABoundFromBelowIsNeverAboveAndRisesWithItsSteps) {
+  const MeshTree tree = bumpy();
+  Random random(14);
+  for (int i = 0; i < 2000; ++i) {
+    const Vector3 p = random.vector(0.5);
+    const double squared = tree.reference_squared_distance(p);
+    double before = 0.0;
+    for (const int steps : {0, 1, 8, 64, 100'000}) {
+      const double bound = tree.squared_lower_bound(p, steps);
+      EXPECT_LE(bound, squared);
+      EXPECT_GE(bound, before);
+      before = bound;
+    }
+  }
+}
+
+TEST(MeshTree, ASearchWithoutStepsTellsSo) {
+  const MeshTree tree = bumpy();
+  std::int64_t none = 0, few = 2, enough = 100'000;
+  EXPECT_FALSE(tree.nearest(Vector3::Zero(), kInfinity, &none).has_value());
+  EXPECT_LT(none, 0);
+  tree.nearest(Vector3::Zero(), kInfinity, &few);
+  EXPECT_LT(few, 0);
+  EXPECT_TRUE(tree.nearest(Vector3::Zero(), kInfinity, &enough).has_value());
+  EXPECT_GT(enough, 0);
+  std::int64_t spent = 0;
+  EXPECT_FALSE(tree.within(Vector3::Zero(), 10.0, &spent));
+  EXPECT_LT(spent, 0);
 }
 
 TEST(MeshTree, FacesWithoutAreaAreLeftOutAndCounted) {

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <array>
+
 #include "proxcgal/pipeline/distance.hpp"
 #include "proxcgal/pipeline/filter.hpp"
 #include "proxcgal/pipeline/sense.hpp"
@@ -31,6 +33,8 @@ TEST(RemoveBody, FastAndPaperKeepTheSamePoints) {
     std::vector<double> tolerance(n);
     for (double& t : tolerance) t = random.uniform(0.0, 0.06);
     std::unique_ptr<bool[]> fast(new bool[n]), paper(new bool[n]);
+    std::fill_n(fast.get(), n, true);
+    std::fill_n(paper.get(), n, true);
     remove_body(*robot, posture, origins, points, tolerance, 0.005, Method::kFast, {fast.get(), n});
     remove_body(*robot, posture, origins, points, tolerance, 0.005, Method::kPaper,
                 {paper.get(), n});
@@ -72,6 +76,98 @@ TEST(ClosestPair, OneNanRowDoesNotChangeTheMinimum) {
   Points with_nan(51, 3);
   with_nan << Eigen::RowVector3d::Constant(std::nan("")), points;
   EXPECT_EQ(closest_pair(*robot, posture, with_nan, Method::kFast).distance, before);
+}
+
+TEST(RemoveNearSurface, DropsAllThatAlgorithm1Drops) {
+  const auto robot = test::arm();
+  Posture posture = robot->make_posture();
+  Random random(15);
+  int removed = 0;
+  for (int trial = 0; trial < 100; ++trial) {
+    robot->update(test::posture(random, 6), posture);
+    constexpr int n = 500;
+    const Points origins = test::cloud(random, n, 0.6), points = test::cloud(random, n, 0.6);
+    std::vector<double> tolerance(n);
+    for (double& t : tolerance) t = random.uniform(0.0, 0.1);
+    std::array<bool, n> algorithm1, margin;
+    algorithm1.fill(true);
+    margin.fill(true);
+    remove_body(*robot, posture, origins, points, tolerance, 0.005, Method::kFast, algorithm1);
+    remove_near_surface(*robot, posture, points, tolerance, margin);
+    for (std::size_t i = 0; i < n; ++i) {
+      EXPECT_TRUE(algorithm1[i] || !margin[i]);
+      removed += algorithm1[i] ? 0 : 1;
+    }
+  }
+  EXPECT_GT(removed, 100);
+}
+
+TEST(ClosestPair, WhereItBeganChangesNothing) {
+  const auto robot = test::arm();
+  Posture posture = robot->make_posture();
+  Random random(16);
+  ClosestPair before;
+  for (int trial = 0; trial < 300; ++trial) {
+    robot->update(test::posture(random, 6), posture);
+    const Points points = test::cloud(random, 1 + trial, 2.0);
+    const ClosestPair afresh = closest_pair(*robot, posture, points, Method::kFast);
+    const ClosestPair found =
+        closest_pair(*robot, posture, points, Method::kFast, {.before = before});
+    EXPECT_EQ(found.distance, afresh.distance);
+    EXPECT_EQ(found.link, afresh.link);
+    EXPECT_EQ(found.point, afresh.point);
+    const double within = random.uniform(0.0, 2.0 * afresh.distance);
+    for (const Method method : {Method::kFast, Method::kPaper}) {
+      const ClosestPair near = closest_pair(*robot, posture, points, method, {.within = within});
+      EXPECT_EQ(near.found(), afresh.distance < within);
+    }
+    before = found;
+  }
+}
+
+TEST(ClosestPair, WithFewStepsTheDistanceIsALowerBoundAndMarked) {
+  const auto robot = test::arm();
+  Posture posture = robot->make_posture();
+  Random random(17);
+  int marked = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    robot->update(test::posture(random, 6), posture);
+    const Points points = test::cloud(random, 500, 1.0);
+    const double exact = closest_pair(*robot, posture, points, Method::kFast).distance;
+    for (const std::int64_t steps : {0, 3, 20, 100, 100'000}) {
+      const ClosestPair pair =
+          closest_pair(*robot, posture, points, Method::kFast, {.steps = steps});
+      ASSERT_TRUE(pair.found());
+      if (pair.lower_bound) {
+        EXPECT_LE(pair.distance, exact);
+        ++marked;
+      } else {
+        EXPECT_EQ(pair.distance, exact);
+      }
+    }
+    EXPECT_FALSE(
+        closest_pair(*robot, posture, points, Method::kFast, {.steps = 100'000}).lower_bound);
+  }
+  EXPECT_GT(marked, 400);
+}
+
+/// Every triangle is as near as any other to a sphere's centre: no box can be left out.
+TEST(ClosestPair, TheCentreOfASphereTakesNoMoreThanItsSteps) {
+  RobotSpec spec;
+  spec.name = "ball";
+  spec.joints = {{.name = "joint", .qd_max = 1.0, .qdd_max = 1.0}};
+  const auto ball = test::bumpy_sphere(70, 140, 0.2, 0.0);
+  spec.links = {
+      {.name = "ball", .joint = 0, .vertices_L = ball.vertices, .triangles = ball.triangles}};
+  const Robot robot(std::move(spec));
+  const Posture posture = robot.make_posture();
+  Random random(18);
+  const Points points = test::cloud(random, 192'000, 1e-3);
+  const ClosestPair pair = closest_pair(robot, posture, points, Method::kFast);
+  EXPECT_TRUE(pair.lower_bound);
+  EXPECT_LE(pair.distance, 0.2);
+  EXPECT_GT(pair.distance, 0.15);  // a bound that says something
+  EXPECT_TRUE(pair.surface_W.allFinite());
 }
 
 TEST(ClosestPair, AnEmptyCloudHasNone) {

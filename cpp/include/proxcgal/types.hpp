@@ -51,7 +51,10 @@ struct PointOrigin {
 /// The nearest obstacle point and the robot surface point nearest to it.
 struct ClosestPair {
   double distance = kInfinity;  ///< [m] unsigned
-  int link = -1;                ///< row of the robot's links
+  /// The search was cut short: the true distance is at least `distance`, and the points are where
+  /// it may be least.
+  bool lower_bound = false;
+  int link = -1;  ///< row of the robot's links
   Vector3 surface_W = Vector3::Zero();
   Vector3 obstacle_W = Vector3::Zero();
   int point = -1;  ///< row of the cloud
@@ -85,6 +88,7 @@ enum class Reason : std::uint8_t {
   kOutsideLimits,       ///< a joint is outside its position limits
   kDeadlineMissed,      ///< the caller's word
   kDeadlinesMissed,     ///< too many in a row
+  kDistanceBounded,     ///< a search was cut short: its distance is a lower bound
   kPointsInvalid,       ///< known points or their velocity not finite, or too many
 };
 

@@ -2,17 +2,11 @@
 #include <cstdint>
 #include <vector>
 
+#include "lanes.hpp"
 #include "proxcgal/geometry/mesh_tree.hpp"
 #include "proxcgal/types.hpp"
 
 namespace proxcgal::detail {
-
-// Four lanes at a time, whatever the processor offers: the compiler maps them.
-using Float4 = float __attribute__((vector_size(16)));
-using Double4 = double __attribute__((vector_size(32)));
-using Mask4 = std::int64_t __attribute__((vector_size(32)));
-
-inline constexpr int kWide = 4;
 
 /// Four children: boxes in single precision, one lane a child. Queries widen them by what
 /// rounding can cost, so a box never hides a triangle that double precision would find.
@@ -31,29 +25,36 @@ struct alignas(32) TriangleBlock {
   std::int32_t id[kWide];
 };
 
+/// A tree as the kernels see it.
+struct BvhView {
+  const BvhNode* nodes;  // root first
+  const TriangleBlock* blocks;
+  double scale;  // largest coordinate: sets the rounding allowance
+};
+
 /// Flat four-wide tree over a link's triangles: what the tick walks.
 class Bvh {
  public:
   Bvh(const Points& vertices, const Triangles& triangles);
 
   /// Nearest surface point strictly within `squared_bound`; triangle -1 where there is none.
-  SurfacePoint nearest(const Vector3& point, double squared_bound, int hint) const;
-  bool within(const Vector3& point, double squared_radius) const;
+  SurfacePoint nearest(const Vector3& point, double squared_bound, std::int64_t& steps) const;
+  double squared_lower_bound(const Vector3& point, int steps) const;
+  bool within(const Vector3& point, double squared_radius, std::int64_t& steps) const;
   bool any_hit(const Vector3& origin, const Vector3& direction, double t_min, double t_max) const;
   double first_hit(const Vector3& origin, const Vector3& direction, double t_min) const;
   /// Squared distance to another surface whose frame has pose T_LO in this one's.
   double squared_distance(const Bvh& other, const Pose& T_LO, double squared_bound,
                           Vector3* on_this, Vector3* on_other) const;
 
+  BvhView view() const { return {nodes_.data(), blocks_.data(), scale_}; }
+
  private:
   struct Builder;
-  template <bool kAnyHit>
-  double trace(const Vector3& origin, const Vector3& direction, double t_min, double t_max) const;
 
   std::vector<BvhNode> nodes_;  // root first
   std::vector<TriangleBlock> blocks_;
-  std::vector<std::int32_t> block_of_;  // triangle -> its block, for hints
-  double scale_ = 0.0;                  // largest coordinate: sets the rounding allowance
+  double scale_ = 0.0;  // largest coordinate: sets the rounding allowance
 };
 
 }  // namespace proxcgal::detail

@@ -7,24 +7,8 @@
 namespace proxcgal::detail {
 namespace {
 
-struct Box {
-  Vector3 low = Vector3::Constant(kInfinity);
-  Vector3 high = Vector3::Constant(-kInfinity);
-  void add(const Vector3& p) {
-    low = low.cwiseMin(p);
-    high = high.cwiseMax(p);
-  }
-  void add(const Box& other) {
-    low = low.cwiseMin(other.low);
-    high = high.cwiseMax(other.high);
-  }
-  double half_area() const {
-    const Vector3 e = high - low;
-    return e.minCoeff() < 0.0 ? 0.0 : e.x() * e.y() + e.y() * e.z() + e.z() * e.x();
-  }
-};
-
-constexpr int kBins = 16;
+constexpr int kMostBins = 16, kFewBins = 8;
+constexpr int kFew = 128;  // triangles for which few bins do as well
 
 float round_down(double x) {
   const auto f = static_cast<float>(x);
@@ -35,6 +19,20 @@ float round_up(double x) {
   return static_cast<double>(f) >= x ? f : std::nextafter(f, INFINITY);
 }
 
+/// Rounded outwards; the fourth lane is unused.
+struct Box {
+  Float4 low{INFINITY, INFINITY, INFINITY, 0.0F};
+  Float4 high{-INFINITY, -INFINITY, -INFINITY, 0.0F};
+  void add(const Box& other) {
+    low = low < other.low ? low : other.low;
+    high = high > other.high ? high : other.high;
+  }
+  float half_area() const {
+    const Float4 e = high - low;
+    return e[0] < 0.0F ? 0.0F : e[0] * e[1] + e[1] * e[2] + e[2] * e[0];
+  }
+};
+
 }  // namespace
 
 /// Binned surface-area heuristic, two binary splits folded into one four-wide node.
@@ -43,11 +41,13 @@ struct Bvh::Builder {
   const Triangles& triangles;
   Bvh& out;
   std::vector<Box> boxes;
-  std::vector<Vector3> centers;
+  std::vector<Float4> centers;
   std::vector<std::int32_t> order;
 
-  struct Range {
-    int begin, end;
+  /// Some triangles of `order`, and the box round them.
+  struct Part {
+    int begin = 0, end = 0;
+    Box box;
     int size() const { return end - begin; }
   };
 
@@ -58,74 +58,110 @@ struct Bvh::Builder {
     order.resize(n);
     std::iota(order.begin(), order.end(), 0);
     for (std::size_t i = 0; i < n; ++i) {
-      for (int k = 0; k < 3; ++k)
-        boxes[i].add(v.row(f(static_cast<Eigen::Index>(i), k)).transpose());
-      centers[i] = 0.5 * (boxes[i].low + boxes[i].high);
+      for (int corner = 0; corner < 3; ++corner) {
+        const int row = f(static_cast<Eigen::Index>(i), corner);
+        Box box;
+        for (int k = 0; k < 3; ++k) {
+          box.low[k] = round_down(v(row, k));
+          box.high[k] = round_up(v(row, k));
+        }
+        boxes[i].add(box);
+      }
+      centers[i] = (boxes[i].low + boxes[i].high) * 0.5F;
     }
   }
 
-  Box bounds(Range r) const {
-    Box box;
-    for (int i = r.begin; i < r.end; ++i) box.add(boxes[static_cast<std::size_t>(order[i])]);
-    return box;
+  Part part(int begin, int end) const {
+    Part part{begin, end, {}};
+    for (int i = begin; i < end; ++i) part.box.add(boxes[static_cast<std::size_t>(order[i])]);
+    return part;
+  }
+
+  /// Splits along the longest side: for two leaves' worth a better plane is not worth its search.
+  std::pair<Part, Part> halves(const Part& whole, Float4 extent) {
+    int axis = extent[1] > extent[0] ? 1 : 0;
+    if (extent[2] > extent[axis]) axis = 2;
+    const auto first = order.begin() + whole.begin, last = order.begin() + whole.end;
+    const auto before = [&](std::int32_t s, std::int32_t t) {
+      return centers[static_cast<std::size_t>(s)][axis] <
+             centers[static_cast<std::size_t>(t)][axis];
+    };
+    const int half = whole.size() / 2;
+    std::nth_element(first, first + half, last, before);
+    return {part(whole.begin, whole.begin + half), part(whole.begin + half, whole.end)};
   }
 
   /// Splits so that box area times count is least; by the median where no plane separates.
-  std::pair<Range, Range> split(Range r) {
+  std::pair<Part, Part> split(const Part& whole) {
     Box spread;
-    for (int i = r.begin; i < r.end; ++i) spread.add(centers[static_cast<std::size_t>(order[i])]);
+    for (int i = whole.begin; i < whole.end; ++i) {
+      const Float4 center = centers[static_cast<std::size_t>(order[i])];
+      spread.add({center, center});
+    }
+    const Float4 extent = spread.high - spread.low;
+    if (whole.size() <= 2 * kWide) return halves(whole, extent);
+    const int bins = whole.size() > kFew ? kMostBins : kFewBins;
+    const auto n_bins = static_cast<std::size_t>(bins);
+    Float4 bins_per_metre{};
+    for (int k = 0; k < 3; ++k)
+      bins_per_metre[k] = extent[k] > 0.0F ? static_cast<float>(bins) / extent[k] : 0.0F;
+    const auto bin_of = [&](std::int32_t t, int axis) {
+      const Float4 at = (centers[static_cast<std::size_t>(t)] - spread.low) * bins_per_metre;
+      return std::min(bins - 1, static_cast<int>(at[axis]));
+    };
+    std::array<std::array<Box, kMostBins>, 3> bin_box;
+    std::array<std::array<int, kMostBins>, 3> bin_count;
+    for (std::size_t a = 0; a < 3; ++a) {
+      std::fill_n(bin_box[a].begin(), n_bins, Box{});
+      std::fill_n(bin_count[a].begin(), n_bins, 0);
+    }
+    for (int i = whole.begin; i < whole.end; ++i) {
+      const auto t = static_cast<std::size_t>(order[i]);
+      const Float4 at = (centers[t] - spread.low) * bins_per_metre;
+      const Box box = boxes[t];
+      for (std::size_t a = 0; a < 3; ++a) {
+        const auto b = static_cast<std::size_t>(std::min(bins - 1, static_cast<int>(at[a])));
+        bin_box[a][b].add(box);
+        ++bin_count[a][b];
+      }
+    }
     int best_axis = -1, best_bin = -1;
-    double best_cost = kInfinity;
+    float best_cost = INFINITY;
     for (int axis = 0; axis < 3; ++axis) {
-      const double extent = spread.high[axis] - spread.low[axis];
-      if (!(extent > 0.0)) continue;
-      std::array<Box, kBins> bin_box{};
-      std::array<int, kBins> bin_count{};
-      for (int i = r.begin; i < r.end; ++i) {
-        const auto t = static_cast<std::size_t>(order[i]);
-        const auto b = static_cast<std::size_t>(bin_of(centers[t][axis], spread.low[axis], extent));
-        bin_box[b].add(boxes[t]);
-        ++bin_count[b];
-      }
-      std::array<double, kBins> right_cost{};
-      Box right;
+      if (!(extent[axis] > 0.0F)) continue;
+      const auto a = static_cast<std::size_t>(axis);
+      std::array<float, kMostBins> right_cost;
+      Box right{}, left{};
       int count = 0;
-      for (int b = kBins - 1; b > 0; --b) {
-        right.add(bin_box[static_cast<std::size_t>(b)]);
-        count += bin_count[static_cast<std::size_t>(b)];
-        right_cost[static_cast<std::size_t>(b)] = count * right.half_area();
+      for (std::size_t b = n_bins - 1; b > 0; --b) {
+        right.add(bin_box[a][b]);
+        count += bin_count[a][b];
+        right_cost[b] = static_cast<float>(count) * right.half_area();
       }
-      Box left;
       count = 0;
-      for (int b = 1; b < kBins; ++b) {
-        left.add(bin_box[static_cast<std::size_t>(b - 1)]);
-        count += bin_count[static_cast<std::size_t>(b - 1)];
-        if (count == 0 || count == r.size()) continue;
-        const double cost = count * left.half_area() + right_cost[static_cast<std::size_t>(b)];
+      for (std::size_t b = 1; b < n_bins; ++b) {
+        left.add(bin_box[a][b - 1]);
+        count += bin_count[a][b - 1];
+        if (count == 0 || count == whole.size()) continue;
+        const float cost = static_cast<float>(count) * left.half_area() + right_cost[b];
         if (cost < best_cost) {
           best_cost = cost;
           best_axis = axis;
-          best_bin = b;
+          best_bin = static_cast<int>(b);
         }
       }
     }
-    const auto first = order.begin() + r.begin, last = order.begin() + r.end;
-    auto middle = first + r.size() / 2;
+    const auto first = order.begin() + whole.begin, last = order.begin() + whole.end;
+    auto middle = first + whole.size() / 2;
     if (best_axis >= 0) {
-      const double low = spread.low[best_axis], extent = spread.high[best_axis] - low;
-      middle = std::partition(first, last, [&](std::int32_t t) {
-        return bin_of(centers[static_cast<std::size_t>(t)][best_axis], low, extent) < best_bin;
-      });
+      middle = std::partition(first, last,
+                              [&](std::int32_t t) { return bin_of(t, best_axis) < best_bin; });
     }
     const int m = static_cast<int>(middle - order.begin());
-    return {{r.begin, m}, {m, r.end}};
+    return {part(whole.begin, m), part(m, whole.end)};
   }
 
-  static int bin_of(double x, double low, double extent) {
-    return std::min(kBins - 1, static_cast<int>(kBins * ((x - low) / extent)));
-  }
-
-  std::int32_t make_block(Range r) {
+  std::int32_t make_block(const Part& r) {
     TriangleBlock block{};
     for (int lane = 0; lane < kWide; ++lane) {
       const std::int32_t t = order[std::min(r.begin + lane, r.end - 1)];
@@ -144,47 +180,40 @@ struct Bvh::Builder {
       const bool sliver = gram < 1e-14 * ab.squaredNorm() * ac.squaredNorm();
       block.inv_gram[lane] = sliver ? 0.0 : 1.0 / gram;
       block.id[lane] = t;
-      out.block_of_[static_cast<std::size_t>(t)] = static_cast<std::int32_t>(out.blocks_.size());
     }
     out.blocks_.push_back(block);
     return ~static_cast<std::int32_t>(out.blocks_.size() - 1);
   }
 
   /// @return row of the node made
-  std::int32_t make_node(Range r) {
-    std::array<Range, kWide> part{};
+  std::int32_t make_node(const Part& whole) {
+    std::array<Part, kWide> parts;
     int n = 1;
-    part[0] = r;
+    parts[0] = whole;
     while (n < kWide) {
-      int widest = -1;
+      int largest = -1;
       for (int i = 0; i < n; ++i) {
-        const auto& p = part[static_cast<std::size_t>(i)];
+        const auto& p = parts[static_cast<std::size_t>(i)];
         if (p.size() > kWide &&
-            (widest < 0 || p.size() > part[static_cast<std::size_t>(widest)].size()))
-          widest = i;
+            (largest < 0 || p.size() > parts[static_cast<std::size_t>(largest)].size()))
+          largest = i;
       }
-      if (widest < 0) break;
-      const auto [left, right] = split(part[static_cast<std::size_t>(widest)]);
-      part[static_cast<std::size_t>(widest)] = left;
-      part[static_cast<std::size_t>(n++)] = right;
+      if (largest < 0) break;
+      const auto [left, right] = split(parts[static_cast<std::size_t>(largest)]);
+      parts[static_cast<std::size_t>(largest)] = left;
+      parts[static_cast<std::size_t>(n++)] = right;
     }
     const auto row = static_cast<std::int32_t>(out.nodes_.size());
     out.nodes_.emplace_back();
     BvhNode node{};
     for (int lane = 0; lane < kWide; ++lane) {
+      const Part part = lane < n ? parts[static_cast<std::size_t>(lane)] : Part{};
       for (int k = 0; k < 3; ++k) {
-        node.low[k][lane] = INFINITY;
-        node.high[k][lane] = -INFINITY;
+        node.low[k][lane] = part.box.low[k];
+        node.high[k][lane] = part.box.high[k];
       }
       node.child[lane] = kEmpty;
-      if (lane >= n) continue;
-      const Range p = part[static_cast<std::size_t>(lane)];
-      const Box box = bounds(p);
-      for (int k = 0; k < 3; ++k) {
-        node.low[k][lane] = round_down(box.low[k]);
-        node.high[k][lane] = round_up(box.high[k]);
-      }
-      node.child[lane] = p.size() <= kWide ? make_block(p) : make_node(p);
+      if (lane < n) node.child[lane] = part.size() <= kWide ? make_block(part) : make_node(part);
     }
     out.nodes_[static_cast<std::size_t>(row)] = node;
     return row;
@@ -192,10 +221,10 @@ struct Bvh::Builder {
 };
 
 Bvh::Bvh(const Points& vertices, const Triangles& triangles) {
-  block_of_.resize(static_cast<std::size_t>(triangles.rows()));
   scale_ = vertices.cwiseAbs().maxCoeff();
+  blocks_.reserve(static_cast<std::size_t>(triangles.rows()) / 2);
   Builder builder(vertices, triangles, *this);
-  builder.make_node({0, static_cast<int>(triangles.rows())});
+  builder.make_node(builder.part(0, static_cast<int>(triangles.rows())));
 }
 
 }  // namespace proxcgal::detail

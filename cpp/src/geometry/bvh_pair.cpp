@@ -106,9 +106,9 @@ Box moved(const Box& box, const Pose& T) {
 /// Lower bound of the distance from a box to four triangles, by the sphere round the box: tight
 /// where a few large triangles face many small ones, and boxes round the large ones say little.
 double sphere_gap(const Vector3& center, double radius, const TriangleBlock& block) {
-  SurfacePoint nearest;
-  closest_in_block(block, center, nearest);
-  return std::max(0.0, std::sqrt(nearest.squared_distance) - radius);
+  Nearest nearest;
+  closest_in_block(block, center.data(), nearest);
+  return std::max(0.0, std::sqrt(nearest.squared) - radius);
 }
 
 /// A pair of subtrees; a negative row is a block.

@@ -20,6 +20,8 @@ using Triangle3 = Kernel::Triangle_3;
 using Primitive = CGAL::AABB_triangle_primitive<Kernel, std::vector<Triangle3>::const_iterator>;
 using CgalTree = CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>>;
 
+constexpr std::int64_t kAnySteps = std::numeric_limits<std::int64_t>::max();
+
 Kernel::Point_3 to_cgal(const Vector3& p) { return {p.x(), p.y(), p.z()}; }
 
 /// Faces with area; throws on what no index can be built from.
@@ -121,14 +123,21 @@ const Bounds& MeshTree::bounds() const { return impl_->bounds; }
 int MeshTree::degenerate_triangles() const { return impl_->degenerate; }
 
 std::optional<SurfacePoint> MeshTree::nearest(const Vector3& point_L, double squared_bound,
-                                              int hint) const {
-  const SurfacePoint found = impl_->bvh.nearest(point_L, squared_bound, hint);
+                                              std::int64_t* steps) const {
+  std::int64_t any = kAnySteps;
+  const SurfacePoint found =
+      impl_->bvh.nearest(point_L, squared_bound, steps != nullptr ? *steps : any);
   if (found.triangle < 0) return std::nullopt;
   return found;
 }
 
-bool MeshTree::within(const Vector3& point_L, double radius) const {
-  return impl_->bvh.within(point_L, radius * radius);
+double MeshTree::squared_lower_bound(const Vector3& point_L, int steps) const {
+  return impl_->bvh.squared_lower_bound(point_L, steps);
+}
+
+bool MeshTree::within(const Vector3& point_L, double radius, std::int64_t* steps) const {
+  std::int64_t any = kAnySteps;
+  return impl_->bvh.within(point_L, radius * radius, steps != nullptr ? *steps : any);
 }
 
 bool MeshTree::any_hit(const Vector3& origin_L, const Vector3& direction_L, double t_min,

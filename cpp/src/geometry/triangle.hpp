@@ -1,15 +1,16 @@
 #pragma once
-#include "bvh.hpp"
+#include "kernels.hpp"
 
-/// Triangle kernels, four at a time.
+/// Triangle kernels, four at a time; internal to each instruction set that includes them.
 namespace proxcgal::detail {
+namespace {
 
-inline Double4 splat(double x) { return Double4{x, x, x, x}; }
-inline Double4 clamp01(Double4 x) {
+Double4 splat(double x) { return Double4{x, x, x, x}; }
+Double4 clamp01(Double4 x) {
   x = x > 0.0 ? x : splat(0.0);
   return x < 1.0 ? x : splat(1.0);
 }
-inline Double4 dot4(const Double4 (&u)[3], const Double4 (&v)[3]) {
+Double4 dot4(const Double4 (&u)[3], const Double4 (&v)[3]) {
   return u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
 }
 
@@ -18,7 +19,7 @@ inline Double4 dot4(const Double4 (&u)[3], const Double4 (&v)[3]) {
 /// Each triangle offers four candidates: the nearest point of each edge, and the foot of the
 /// normal where it lies inside. All of them are points of the triangle, so rounding can never
 /// report less than the true distance by more than itself, not even on slivers.
-inline void closest_in_block(const TriangleBlock& block, const Vector3& point, SurfacePoint& best) {
+void closest_in_block(const TriangleBlock& block, const double* point, Nearest& best) {
   Double4 ab[3], ac[3], ap[3];
   for (int k = 0; k < 3; ++k) {
     ab[k] = block.b[k] - block.a[k];
@@ -48,12 +49,11 @@ inline void closest_in_block(const TriangleBlock& block, const Vector3& point, S
   consider(v, w, (v >= 0.0) & (w >= 0.0) & (v + w <= 1.0));
 
   for (int lane = 0; lane < kWide; ++lane) {
-    if (!(best_d[lane] < best.squared_distance)) continue;
-    best.squared_distance = best_d[lane];
+    if (!(best_d[lane] < best.squared)) continue;
+    best.squared = best_d[lane];
     best.triangle = block.id[lane];
     for (int k = 0; k < 3; ++k) {
-      best.point_L[k] =
-          block.a[k][lane] + (best_v[lane] * ab[k][lane] + best_w[lane] * ac[k][lane]);
+      best.point[k] = block.a[k][lane] + (best_v[lane] * ab[k][lane] + best_w[lane] * ac[k][lane]);
     }
   }
 }
@@ -62,8 +62,8 @@ inline void closest_in_block(const TriangleBlock& block, const Vector3& point, S
 ///
 /// Signed volumes of the ray with each edge (Pluecker), taken about the ray's origin: the value of
 /// a shared edge is exactly opposite in both triangles, so no ray slips between them.
-inline double first_hit_in_block(const TriangleBlock& block, const Vector3& origin,
-                                 const Vector3& direction, double t_min, double t_max) {
+[[maybe_unused]] double first_hit_in_block(const TriangleBlock& block, const double* origin,
+                                           const double* direction, double t_min, double t_max) {
   Double4 a[3], b[3], c[3];
   for (int k = 0; k < 3; ++k) {
     a[k] = block.a[k] - splat(origin[k]);
@@ -100,4 +100,5 @@ inline double first_hit_in_block(const TriangleBlock& block, const Vector3& orig
   return best;
 }
 
+}  // namespace
 }  // namespace proxcgal::detail

@@ -46,6 +46,7 @@ Sense::Sense(const SensorModel& model) : model_(model) {
     x_per_range_[row] =
         model.range_model == RangeModel::kPrinted ? std::sin(alpha) : std::tan(alpha);
     y_per_range_[row] = std::tan(beta);
+    ray_per_range_[row] = Vector3(x_per_range_[row], y_per_range_[row], 1.0).norm();
   }
 }
 
@@ -75,14 +76,15 @@ void Sense::operator()(const Scan& scan, SensedPoints& out) const {
       if (out.invalid++ == 0) out.first_invalid_zone = zone;
     }
     if (state != ZoneState::kTarget && state != ZoneState::kUncertain) continue;
-    const Vector3 point_S = point(zone, range);
-    const double along_ray = point_S.norm();
+    const double ray_per_range = ray_per_range_[static_cast<std::size_t>(zone)];
+    const double along_ray = range * ray_per_range;
     if (along_ray > model_.workspace) continue;
     const auto i = static_cast<std::size_t>(out.count++);
-    out.point_S[i] = point_S;
+    out.point_S[i] = point(zone, range);
+    out.range[i] = along_ray;
     out.zone[i] = static_cast<std::uint8_t>(zone);
     // The noise is that of the range; along the slanted ray it is longer by the same factor.
-    out.sigma[i] = model_.sigma(range) * (along_ray / range) *
+    out.sigma[i] = model_.sigma(range) * ray_per_range *
                    (state == ZoneState::kUncertain ? kUncertainSigma : 1.0);
   }
 }

@@ -27,6 +27,7 @@ Mode mode_of(Reason reason) {
       return Mode::kHold;
     case Reason::kSensorSilent:
     case Reason::kPointsInvalid:
+    case Reason::kDistanceBounded:
       return Mode::kDegraded;
     case Reason::kScanRefused:
     case Reason::kZoneInvalid:
@@ -71,6 +72,8 @@ const char* reason_name(Reason reason) {
       return "deadline_missed";
     case Reason::kDeadlinesMissed:
       return "deadlines_missed";
+    case Reason::kDistanceBounded:
+      return "distance_bounded";
     case Reason::kPointsInvalid:
       return "points_invalid";
   }

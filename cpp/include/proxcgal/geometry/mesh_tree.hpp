@@ -21,12 +21,18 @@ struct SurfacePoint {
   int triangle = -1;
 };
 
+/// Tree nodes and leaves that one search may look at: a few hundred times what real scenes take,
+/// and some 30 ms where a cloud is made to be slow.
+inline constexpr std::int64_t kSearchSteps = 500'000;
+
 /// Surface of one rigid link: indexed once, queried every tick.
 ///
 /// All of it is in the link frame L, so moving the arm never rebuilds it: bring the cloud to L.
 /// Two indices stand on the same triangles: a flat one for the hot queries, and CGAL's AABB tree
 /// (`reference_*`), which the literal algorithms use and the tests trust. Queries are const, never
 /// allocate unless they say so, and may run from several threads. Query points must be finite.
+/// Work is bounded in steps (tree nodes and leaves looked at), not in time, so that a result
+/// depends on nothing but its inputs.
 class MeshTree {
  public:
   /// @param vertices_L  shape (v, 3) [m]
@@ -44,12 +50,16 @@ class MeshTree {
 
   /// Nearest surface point within a bound, or nothing: the bound prunes the search.
   /// @param squared_bound  only surface strictly nearer counts [m^2]
-  /// @param hint           a triangle to try first, -1 for none
+  /// @param steps          counted down, where given; below 0 the nearest so far was returned
   std::optional<SurfacePoint> nearest(const Vector3& point_L, double squared_bound = kInfinity,
-                                      int hint = -1) const;
+                                      std::int64_t* steps = nullptr) const;
+
+  /// No surface is nearer than this: what a few steps can tell [m^2].
+  double squared_lower_bound(const Vector3& point_L, int steps) const;
 
   /// Is any surface nearer than `radius`? Stops at the first.
-  bool within(const Vector3& point_L, double radius) const;
+  /// @param steps  counted down, where given; below 0 the answer is no for want of steps
+  bool within(const Vector3& point_L, double radius, std::int64_t* steps = nullptr) const;
 
   /// Does the segment origin + t direction, t in [t_min, t_max], meet the surface?
   bool any_hit(const Vector3& origin_L, const Vector3& direction_L, double t_min,

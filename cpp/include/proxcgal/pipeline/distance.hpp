@@ -5,15 +5,23 @@
 
 namespace proxcgal {
 
-/// Algorithm 2 of [WA]: the nearest (cloud point, surface point) over the links asked for.
-/// @param links  rows to look at; empty means all
-/// @return       `found()` is false for an empty cloud
-ClosestPair closest_pair(const Robot& robot, const Posture& posture, const PointsRef& points_W,
-                         Method method, std::span<const int> links = {});
+/// What a caller knows and wants of a search.
+struct SearchOptions {
+  std::span<const int> links;         ///< rows to look at; empty means all
+  ClosestPair before;                 ///< of a moment ago, where there is one: `fast` begins there
+  double within = kInfinity;          ///< [m] only a nearer pair counts
+  std::int64_t steps = kSearchSteps;  ///< for `fast`; past them the answer is a lower bound
+};
 
-/// The nearest pair of each link of `links` (all where empty), in that order.
-/// @param[out] out  one per link
+/// Algorithm 2 of [WA]: the nearest (cloud point, surface point) over the links asked for.
+/// @return  `found()` is false for an empty cloud, and where none is near enough
+ClosestPair closest_pair(const Robot& robot, const Posture& posture, const PointsRef& points_W,
+                         Method method, const SearchOptions& options = {});
+
+/// The nearest pair of each link of `links` (all where empty), in that order; each by `fast`.
+/// @param[in,out] pairs  one per link: where each search begins, where found; the answer
 void closest_pairs(const Robot& robot, const Posture& posture, const PointsRef& points_W,
-                   std::span<const int> links, std::span<ClosestPair> out);
+                   std::span<const int> links, std::span<ClosestPair> pairs,
+                   std::int64_t steps = kSearchSteps);
 
 }  // namespace proxcgal

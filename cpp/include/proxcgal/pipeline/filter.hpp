@@ -8,19 +8,22 @@ namespace proxcgal {
 /// queries, kept as oracle and as the baseline of every timing.
 enum class Method : std::uint8_t { kFast, kPaper };
 
-/// Algorithm 1 of [WA]: drop a point when any link's first hit along its ray explains it.
+/// Algorithm 1 of [WA]: clears `keep` where any link's first hit along a point's ray explains it.
 ///
 /// @param origins_W  ray origins, (n, 3): the emitters
 /// @param points_W   measured points, (n, 3)
 /// @param tolerance  (n,) how far from the first hit a point may be and still be body [m]
 /// @param min_hit    hits nearer to the emitter are the emitter's own mounting [m]
-/// @param[out] keep  (n,) true where the point is not the robot's own body
+/// @param keep       (n,) cleared where the point is the robot's own body, else left as it is
 void remove_body(const Robot& robot, const Posture& posture, const PointsRef& origins_W,
                  const PointsRef& points_W, std::span<const double> tolerance, double min_hit,
                  Method method, std::span<bool> keep);
 
 /// Clears `keep` where a point is nearer than its tolerance to any link's surface. Ours: Algorithm
 /// 1 alone lets noisy self-hits through (docs/sources.md).
+///
+/// Every point that Algorithm 1 drops is dropped here too: the hit that explains it is within its
+/// tolerance. Work is bounded; a point that it does not suffice for is kept, as an obstacle.
 void remove_near_surface(const Robot& robot, const Posture& posture, const PointsRef& points_W,
                          std::span<const double> tolerance, std::span<bool> keep);
 

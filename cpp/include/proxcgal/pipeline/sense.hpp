@@ -48,6 +48,7 @@ enum class ZoneState : std::uint8_t { kTarget, kUncertain, kEmpty, kInvalid };
 struct SensedPoints {
   int count = 0;
   std::array<Vector3, kZones> point_S;
+  std::array<double, kZones> range;  ///< [m] along the ray
   std::array<double, kZones> sigma;  ///< [m] along the ray, larger where the status is uncertain
   std::array<std::uint8_t, kZones> zone;
   int invalid = 0;  ///< zones that are neither target nor empty
@@ -71,6 +72,7 @@ class Sense {
   SensorModel model_;
   std::array<double, kZones> x_per_range_;
   std::array<double, kZones> y_per_range_;
+  std::array<double, kZones> ray_per_range_;  // length along the slanted ray
 };
 
 }  // namespace proxcgal

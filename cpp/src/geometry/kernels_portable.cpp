@@ -1,0 +1,3 @@
+#define PROXCGAL_KERNELS kPortableKernels
+#define PROXCGAL_KERNELS_NAME "portable"
+#include "kernels_body.hpp"
