@@ -5,6 +5,7 @@
 #include <CGAL/AABB_triangle_primitive.h>
 #include <CGAL/Simple_cartesian.h>
 
+#include <atomic>
 #include <cmath>
 #include <mutex>
 #include <string>
@@ -84,7 +85,8 @@ struct MeshTree::Impl {
   Bounds bounds;
   detail::Bvh bvh;
   // Only the literal algorithms ask CGAL's tree, so it is built at their first question.
-  mutable std::once_flag built;
+  mutable std::once_flag begun;
+  mutable std::atomic<bool> built = false;  // asked first: a look at a once_flag costs more
   mutable std::vector<Triangle3> soup;
   mutable CgalTree cgal;
 
@@ -96,7 +98,8 @@ struct MeshTree::Impl {
         bvh(vertices, triangles) {}
 
   const CgalTree& reference() const {
-    std::call_once(built, [this] {
+    if (built.load(std::memory_order_acquire)) return cgal;
+    std::call_once(begun, [this] {
       soup.reserve(static_cast<std::size_t>(triangles.rows()));
       for (Eigen::Index f = 0; f < triangles.rows(); ++f) {
         soup.emplace_back(to_cgal(vertices.row(triangles(f, 0))),
@@ -106,6 +109,7 @@ struct MeshTree::Impl {
       cgal.insert(soup.cbegin(), soup.cend());
       cgal.build();
       cgal.accelerate_distance_queries();  // the kd-tree as well: built late it is not thread-safe
+      built.store(true, std::memory_order_release);
     });
     return cgal;
   }

@@ -1,0 +1,290 @@
+// Every stage and the whole tick on the cells that inputs.py wrote:
+//
+//     bench_pipeline CELL.bin ... [--benchmark_filter=tick] [--benchmark_out=FILE]
+//
+// Names tell stage, question, robot, resolution and size: tick/scans/ur10e_10000_raw/points=1580.
+#include <chrono>
+#include <cstdio>
+#include <cstring>
+#include <random>
+
+#include "cell.hpp"
+#include "samples.hpp"
+
+namespace proxcgal::bench {
+namespace {
+
+constexpr double kTickBudget = 150.0, kLargeBudget = 5000.0, kWorstBudget = 66'700.0;  // [us]
+constexpr int kTicks = 5000;
+
+std::string named(const char* what, const Cell& cell, Eigen::Index points) {
+  return std::string(what) + '/' + cell.name + "/points=" + std::to_string(points);
+}
+
+template <class Run>
+void add(const std::string& name, int iterations, Run run) {
+  benchmark::RegisterBenchmark(name.c_str(), run)
+      ->UseManualTime()
+      ->Iterations(iterations)
+      ->Unit(benchmark::kMicrosecond);
+}
+
+/// `factor` clouds in one: what many more sensors would see, each a little off.
+Points many(const Points& points, int factor) {
+  std::mt19937_64 engine(0);
+  std::normal_distribution<double> noise(0.0, 0.01);
+  Points out(points.rows() * factor, 3);
+  for (int copy = 0; copy < factor; ++copy) {
+    for (Eigen::Index i = 0; i < points.rows(); ++i) {
+      for (int k = 0; k < 3; ++k)
+        out(copy * points.rows() + i, k) = points(i, k) + (copy == 0 ? 0.0 : noise(engine));
+    }
+  }
+  return out;
+}
+
+void add_stages(const Cell& cell) {
+  add(named("sense/points", cell, static_cast<Eigen::Index>(cell.scans.size()) * kZones), 2000,
+      [&cell](benchmark::State& state) {
+        const Sense sense(cell.skin.model);
+        SensedPoints out;
+        Samples samples;
+        for (auto _ : state) {
+          samples.take(state, [&] {
+            for (const Scan& scan : cell.scans) {
+              sense(scan, out);
+              benchmark::DoNotOptimize(out);
+            }
+          });
+        }
+        samples.report(state);
+      });
+  for (const Method method : {Method::kFast, Method::kPaper}) {
+    const bool fast = method == Method::kFast;
+    add(named(fast ? "filter/algorithm1" : "filter/algorithm1_paper", cell, cell.points_W.rows()),
+        fast ? 2000 : 5, [&cell, method](benchmark::State& state) {
+          const std::size_t n = cell.tolerance.size();
+          const auto keep = std::make_unique<bool[]>(n);
+          Samples samples;
+          for (auto _ : state) {
+            std::fill_n(keep.get(), n, true);
+            samples.take(state, [&] {
+              remove_body(*cell.robot, cell.posture, cell.origins_W, cell.points_W, cell.tolerance,
+                          cell.min_hit, method, {keep.get(), n});
+            });
+          }
+          if (!std::equal(keep.get(), keep.get() + n, cell.kept.begin()))
+            state.SkipWithError("another mask than the literal algorithm's");
+          samples.report(state);
+        });
+    add(named(fast ? "distance/closest" : "distance/closest_paper", cell,
+              cell.environment_W.rows()),
+        fast ? 2000 : 5, [&cell, method](benchmark::State& state) {
+          Samples samples;
+          ClosestPair pair;
+          for (auto _ : state) {
+            samples.take(state, [&] {
+              pair = closest_pair(*cell.robot, cell.posture, cell.environment_W, method);
+            });
+          }
+          if (!(std::abs(pair.distance - cell.distance) < 1e-9))
+            state.SkipWithError("another distance than the literal algorithm's");
+          samples.report(state);
+        });
+  }
+  add(named("filter/surface_margin", cell, cell.points_W.rows()), 2000,
+      [&cell](benchmark::State& state) {
+        const std::size_t n = cell.tolerance.size();
+        const auto keep = std::make_unique<bool[]>(n);
+        Samples samples;
+        for (auto _ : state) {
+          std::fill_n(keep.get(), n, true);
+          samples.take(state, [&] {
+            remove_near_surface(*cell.robot, cell.posture, cell.points_W, cell.tolerance,
+                                {keep.get(), n});
+          });
+        }
+        samples.report(state);
+      });
+  add(named("distance/per_link", cell, cell.environment_W.rows()), 1000,
+      [&cell](benchmark::State& state) {
+        std::vector<ClosestPair> pairs(static_cast<std::size_t>(cell.robot->n_links()));
+        Samples samples;
+        for (auto _ : state) {
+          samples.take(state, [&] {
+            closest_pairs(*cell.robot, cell.posture, cell.environment_W, {}, pairs);
+          });
+        }
+        samples.report(state);
+      });
+}
+
+/// Each tick gets a new scan of every sensor: the most that there can be to do.
+void add_tick(const Cell& cell, const char* name, const std::vector<TaskSpec>& tasks) {
+  add(named(name, cell, static_cast<Eigen::Index>(cell.scans.size()) * kZones), kTicks,
+      [&cell, tasks](benchmark::State& state) {
+        ControllerConfig config;
+        config.tasks = tasks;
+        Controller controller(cell.robot, cell.skin, config);
+        std::vector<Scan> scans = cell.scans;
+        const JointVector q = cell.posture.q;
+        double time = 0.0;
+        Samples samples;
+        for (auto _ : state) {
+          time += config.period;
+          for (Scan& scan : scans) {
+            ++scan.counter;
+            scan.stamp = time;
+          }
+          samples.take(
+              state, [&] { benchmark::DoNotOptimize(controller.tick(time, q, scans, cell.goal)); });
+        }
+        samples.report(state, kTickBudget);
+        state.counters["cloud"] = static_cast<double>(controller.cloud_W().rows());
+      });
+}
+
+void add_large(const Cell& cell) {
+  for (const int factor : {1, 10, 100}) {
+    const auto points = std::make_shared<Points>(many(cell.environment_W, factor));
+    add(named("distance/many", cell, points->rows()), factor == 100 ? 200 : 1000,
+        [&cell, points, factor](benchmark::State& state) {
+          Samples samples;
+          for (auto _ : state) {
+            samples.take(state, [&] {
+              benchmark::DoNotOptimize(
+                  closest_pair(*cell.robot, cell.posture, *points, Method::kFast));
+            });
+          }
+          samples.report(state, factor == 100 ? kLargeBudget : 0.0);
+        });
+  }
+}
+
+/// Points at the middle of a link, from where its surface is about equally far all round.
+void add_adversarial(const Cell& cell) {
+  for (const int n : {1920, 192'000}) {
+    std::mt19937_64 engine(0);
+    std::normal_distribution<double> noise(0.0, 1e-4);
+    const auto points = std::make_shared<Points>(n, 3);
+    const int link = cell.robot->n_links() / 2;
+    const Vector3 center_W =
+        cell.posture.T_WL[static_cast<std::size_t>(link)] * cell.robot->tree(link).bounds().center;
+    for (int i = 0; i < n; ++i) {
+      for (int k = 0; k < 3; ++k) (*points)(i, k) = center_W[k] + noise(engine);
+    }
+    add(named("distance/inside", cell, n), 50, [&cell, points](benchmark::State& state) {
+      Samples samples;
+      ClosestPair pair;
+      for (auto _ : state) {
+        samples.take(
+            state, [&] { pair = closest_pair(*cell.robot, cell.posture, *points, Method::kFast); });
+      }
+      samples.report(state, kWorstBudget);
+      state.counters["lower_bound"] = pair.lower_bound ? 1 : 0;
+    });
+  }
+}
+
+/// The centre of a sphere of 10^4 vertices: no part of the surface can be left out.
+void add_sphere() {
+  for (const int n : {1920, 192'000}) {
+    add("distance/sphere_centre/vertices=9940/points=" + std::to_string(n), 20,
+        [n](benchmark::State& state) {
+          constexpr int rings = 71, segments = 140;
+          RobotSpec spec;
+          spec.name = "ball";
+          spec.joints = {{.name = "joint", .qd_max = 1.0, .qdd_max = 1.0}};
+          LinkSpec link{.name = "ball", .joint = 0};
+          link.vertices_L.resize((rings + 1) * segments, 3);
+          link.triangles.resize(2 * rings * segments, 3);
+          for (int i = 0, f = 0; i <= rings; ++i) {
+            for (int j = 0; j < segments; ++j) {
+              const double theta = M_PI * i / rings, phi = 2 * M_PI * j / segments;
+              link.vertices_L.row(i * segments + j) << 0.2 * std::sin(theta) * std::cos(phi),
+                  0.2 * std::sin(theta) * std::sin(phi), 0.2 * std::cos(theta);
+              if (i == rings) continue;
+              const int a = i * segments + j, b = i * segments + (j + 1) % segments;
+              link.triangles.row(f++) << a, a + segments, b;
+              link.triangles.row(f++) << b, a + segments, b + segments;
+            }
+          }
+          spec.links = {link};
+          const Robot robot(std::move(spec));
+          const Posture posture = robot.make_posture();
+          std::mt19937_64 engine(0);
+          std::uniform_real_distribution<double> noise(-1e-3, 1e-3);
+          Points points(n, 3);
+          for (double& x : points.reshaped()) x = noise(engine);
+          Samples samples;
+          ClosestPair pair;
+          for (auto _ : state) {
+            samples.take(state,
+                         [&] { pair = closest_pair(robot, posture, points, Method::kFast); });
+          }
+          samples.report(state, kWorstBudget);
+          state.counters["lower_bound"] = pair.lower_bound ? 1 : 0;
+          state.counters["distance_m"] = pair.distance;
+        });
+  }
+}
+
+void add_loading(const Cell& cell) {
+  add("load/trees/" + cell.name, 10, [&cell](benchmark::State& state) {
+    std::vector<double> ms;
+    for (auto _ : state) {
+      const auto begin = std::chrono::steady_clock::now();
+      const Robot robot(cell.robot->spec());
+      const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
+      state.SetIterationTime(took.count());
+      ms.push_back(1e3 * took.count());
+    }
+    std::sort(ms.begin(), ms.end());
+    state.counters["median_ms"] = ms[ms.size() / 2];  // wall: links are built side by side
+    state.counters["budget_ms"] = 80.0;
+  });
+}
+
+}  // namespace
+}  // namespace proxcgal::bench
+
+int main(int argc, char** argv) {
+  using namespace proxcgal;         // NOLINT(google-build-using-namespace)
+  using namespace proxcgal::bench;  // NOLINT(google-build-using-namespace)
+  std::vector<Cell> cells;
+  std::vector<char*> rest;
+  for (int i = 0; i < argc; ++i) {
+    const bool is_cell = i > 0 && std::strstr(argv[i], ".bin") != nullptr && argv[i][0] != '-';
+    if (!is_cell) {
+      rest.push_back(argv[i]);
+      continue;
+    }
+    try {
+      cells.push_back(read_cell(argv[i]));
+    } catch (const std::exception& error) {
+      std::fprintf(stderr, "bench_pipeline: %s\n", error.what());
+      return 2;
+    }
+  }
+  if (cells.empty()) {
+    std::fputs("bench_pipeline CELL.bin ...: no cell; bench/inputs.py writes them\n", stderr);
+    return 2;
+  }
+  for (const Cell& cell : cells) {
+    add_stages(cell);
+    add_tick(cell, "tick/scans", {Avoidance{}, Reach{}});
+    add_tick(
+        cell, "tick/five_tasks",
+        {JointLimits{}, Avoidance{.nearest = 3}, MinimumAltitude{}, Manipulability{}, Reach{}});
+    add_large(cell);
+    add_adversarial(cell);
+    add_loading(cell);
+  }
+  add_sphere();
+  int left = static_cast<int>(rest.size());
+  benchmark::Initialize(&left, rest.data());
+  if (benchmark::ReportUnrecognizedArguments(left, rest.data())) return 2;
+  benchmark::RunSpecifiedBenchmarks();
+  benchmark::Shutdown();
+  return 0;
+}
