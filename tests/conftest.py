@@ -41,4 +41,49 @@ def shared_robots() -> Path:
     return SHARED_ROBOTS
 
 
+@pytest.fixture(scope="session")
+def arm_cell(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A scenario file, `cell.toml`, of a small arm that stands still beside a panel."""
+    folder = tmp_path_factory.mktemp("cell")
+    (folder / "arm.urdf").write_text(_ARM)
+    (folder / "cell.toml").write_text(_CELL)
+    return folder / "cell.toml"
+
+
 _LEFT_OUT = pytest.StashKey[int]()
+
+# Small meshes, so that no test waits for their decimation.
+_ARM = """<?xml version="1.0"?><robot name="arm">
+<link name="base_link"><visual><geometry><box size="0.2 0.2 0.1"/></geometry></visual></link>
+<link name="upper"><visual><origin xyz="0 0 0.25"/>
+  <geometry><cylinder radius="0.05" length="0.5"/></geometry></visual></link>
+<link name="hand"><visual><geometry><sphere radius="0.08"/></geometry></visual></link>
+<joint name="turn" type="revolute"><parent link="base_link"/><child link="upper"/>
+  <axis xyz="0 0 1"/><limit lower="-3" upper="3" velocity="1" effort="1"/></joint>
+<joint name="bend" type="revolute"><parent link="upper"/><child link="hand"/>
+  <origin xyz="0 0 0.65"/><axis xyz="0 1 0"/>
+  <limit lower="-2" upper="2" velocity="1" effort="1"/></joint>
+</robot>"""
+
+_CELL = """
+kind = "static"
+robot = "arm.urdf"
+q0 = [0.1, 0.2]
+duration = 1.0
+[goal]
+offset = [0.0, 0.0, 0.0]
+[[skin.rings]]
+link = "upper"
+at = [0.3, 0.9]
+sensors = 6
+[skin.sensor]
+workspace = 6.0
+[[obstacle]]
+name = "panel"
+size = [0.02, 0.8, 0.8]
+position = [0.6, 0.0, 0.5]
+[[obstacle]]
+name = "wall"
+size = [0.1, 4.0, 3.0]
+position = [-1.7, 0.0, 0.5]
+"""

@@ -21,6 +21,8 @@ usage: proxcgal COMMAND ...
 
   run SCENARIO   simulate a scene with one or several controllers, write what happened
   demo           both static scenes with all controllers, one report
+  campaign KIND  many trials, on this machine or on a cluster, and what they amount to
+  sweep          time both algorithms, literal and accelerated, over meshes and clouds
   replay FILE    step through a recording
   report DIR     write DIR/report.html from the results in DIR
   scenarios      the scenes there are
@@ -35,12 +37,15 @@ examples:
   proxcgal run front_plane --set controller.d_min=0.25 simulation.dropout=0.1
   proxcgal run front_plane --robot my_arm.urdf --package-dir ~/robots
   proxcgal replay out/side/wb.mcap --every 50
+  proxcgal sweep --quick
 """
 
 #: Module that holds each command's options, `RunOptions`, and what it does, `run_command`.
 COMMANDS = {
     "run": "proxcgal.apps.run",
     "demo": "proxcgal.apps.demo",
+    "campaign": "proxcgal.apps.campaign",
+    "sweep": "proxcgal.apps.sweep",
     "replay": "proxcgal.apps.replay",
     "report": "proxcgal.apps.report",
     "scenarios": "proxcgal.apps.lists",

@@ -21,9 +21,20 @@ def origin(command: str) -> dict[str, Any]:
         "command": command,
         "made": datetime.now(UTC).strftime("%Y-%m-%d %H:%M:%S UTC"),
         "commit": commit(Path.cwd()),
-        "machine": f"{platform.machine()}, {os.cpu_count()} processors, {platform.system()}",
+        "machine": machine(),
         "versions": versions(),
     }
+
+
+def machine() -> str:
+    """The processor, how many there are, and the system: what a time depends on."""
+    try:
+        told = Path("/proc/cpuinfo").read_text(errors="replace")
+    except OSError:
+        told = ""
+    models = [line.partition(":")[2].strip() for line in told.splitlines() if "model name" in line]
+    processor = f"{models[0]} ({platform.machine()})" if models else platform.machine()
+    return f"{processor}, {os.cpu_count()} processors, {platform.system()}"
 
 
 def versions() -> dict[str, str]:

@@ -1,18 +1,14 @@
-"""The HTML of a report: no network, no other file; all text escaped."""
+"""The HTML of a report on trials: tables, figures, what was found."""
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Iterator, Sequence
 from html import escape
-from importlib import resources
-from pathlib import Path
 
+from proxcgal.apps.document import PICTURE_BYTES, document, origin_part, picture
 from proxcgal.apps.stored import About, Numbers, Run
 from proxcgal.study.analysis import SELF_LIMIT_M, shown
 
-MAX_BYTES = 10_000_000  # of the whole page
-_SPARE_BYTES = 400_000  # kept for text
 PICTURES = (
     (
         "distance.png",
@@ -49,39 +45,32 @@ def page(runs: Sequence[Run], about: About) -> str:
         runs: scenario by scenario.
         about: how the whole was made, as `origin` has it.
     """
-    return "\n".join(_parts(runs, about)) + "\n"
+    title = "Whole-arm avoidance: " + ", ".join(run.summary.scenario for run in runs)
+    return document(title, _parts(runs, about))
 
 
 def _parts(runs: Sequence[Run], about: About) -> Iterator[str]:
-    title = "Whole-arm avoidance: " + ", ".join(run.summary.scenario for run in runs)
-    css = resources.files("proxcgal.apps").joinpath("report.css").read_text()
-    yield "<!DOCTYPE html>"
-    yield '<html lang="en"><head><meta charset="utf-8">'
-    yield '<meta name="viewport" content="width=device-width, initial-scale=1">'
-    yield f"<title>{escape(title)}</title><style>{css}</style></head><body>"
-    yield f"<h1>{escape(title)}</h1>"
     yield from _introduction(runs)
     yield from _table(runs)
     yield from _verdict(runs)
-    budget = MAX_BYTES - _SPARE_BYTES
+    budget = PICTURE_BYTES
     for run in runs:
         yield f"<h2>{escape(run.summary.scenario)}</h2>"
         if run.about.description:
             yield f"<p>{escape(_sentence(run.about.description))}</p>"
         for name, caption in PICTURES:
-            part, used = _picture(run.folder / name, caption, budget)
+            part, used = picture(run.folder / name, caption, budget)
             budget -= used
             yield part
         yield from _trials(run)
         yield from _recordings(run)
-    yield from _origin(about)
+    yield from origin_part(about)
     for run in runs:
         if run.settings:
             yield f"<h3>Settings of {escape(run.summary.scenario)}</h3>"
             yield f'<p class="soft">The resolved scenario ({escape("scenario.toml")}); '
             yield "<code>proxcgal run</code> takes this file as it is.</p>"
             yield f"<pre>{escape(run.settings)}</pre>"
-    yield "</body></html>"
 
 
 def _introduction(runs: Sequence[Run]) -> Iterator[str]:
@@ -168,21 +157,6 @@ def _sentence(text: str) -> str:
     return text[:1].upper() + text[1:].rstrip(". ") + "."
 
 
-def _picture(path: Path, caption: str, budget: int) -> tuple[str, int]:
-    """The figure with its picture inside, and the bytes that it takes of the page."""
-    if not path.is_file():
-        return "", 0
-    size = 4 * ((path.stat().st_size + 2) // 3)
-    if size > budget:
-        text = f"left out here to keep the page under {MAX_BYTES // 1_000_000} MB"
-        return f'<p class="soft">{escape(path.name)}: {text}.</p>', 0
-    kind = "gif" if path.suffix == ".gif" else "png"
-    data = base64.b64encode(path.read_bytes()).decode()
-    alt = escape(caption.split(". ")[0], quote=True)
-    part = f'<figure><img src="data:image/{kind};base64,{data}" alt="{alt}">'
-    return part + f"<figcaption>{escape(caption)}</figcaption></figure>", size
-
-
 def _trials(run: Run) -> Iterator[str]:
     """Timings, modes and findings per trial."""
     if not run.about.trials:
@@ -211,19 +185,3 @@ def _recordings(run: Run) -> Iterator[str]:
         names = ", ".join(f"<code>{escape(f.name)}</code>" for f in files)
         yield f'<p class="soft">Recordings of every tick beside this page: {names}. '
         yield "<code>proxcgal replay FILE</code> steps through one; Foxglove opens them.</p>"
-
-
-def _origin(about: About) -> Iterator[str]:
-    yield "<h2>How this was made</h2>"
-    if about.command:
-        yield f'<pre class="wrap">{escape(about.command)}</pre>'
-    rows = [("made", about.made), ("commit", about.commit), ("machine", about.machine)]
-    rows += about.versions.items()
-    yield "<table><tbody>"
-    for name, value in rows:
-        if value:
-            yield f'<tr><td class="left">{escape(name)}</td>'
-            yield f'<td class="wide">{escape(value)}</td></tr>'
-    yield '<tr><td class="left">[WA]</td><td class="wide">S. Borelli et al., Generating '
-    yield "Whole-Arm Avoidance Motion Through Localized Proximity Sensing, IEEE/ASME Trans. "
-    yield "Mechatronics, 2025, doi:10.1109/TMECH.2025.3582432</td></tr></tbody></table>"

@@ -54,6 +54,10 @@ class Progress:
             done = sum(s * size for s, size in zip(shares, self._sizes, strict=True))
             self._bar.update(done - self._bar.n)
 
+    def first(self, count: int) -> None:
+        """So many pieces are done, in their order, and none of the others begun."""
+        self.shares([1.0] * count + [0.0] * (len(self._sizes) - count))
+
     def finished(self, text: str) -> None:
         """One piece is done; its line is for logs, a bar shows it anyway."""
         if self._bar is None and not self._quiet:

@@ -18,10 +18,11 @@ class ReportOptions:
     Examples:
       proxcgal report out/demo
       proxcgal report out/front_plane
+      proxcgal report out/sweep
     """
 
     dir: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR")]
-    """A folder that `proxcgal run` or `proxcgal demo` wrote."""
+    """A folder that `proxcgal run`, `proxcgal demo` or `proxcgal sweep` wrote."""
 
 
 def report_command(options: ReportOptions, command: str) -> int:
@@ -34,7 +35,7 @@ def write_report(folder: Path) -> Path:
     """Writes `report.html` of a folder of results, from what lies in it.
 
     Args:
-        folder: of one run, or of several scenarios' runs (one sub-folder each).
+        folder: of one run, of several scenarios' runs (one sub-folder each), or of a timing grid.
 
     Returns:
         Path of the page: at most 10 MB, pictures inside, nothing fetched from anywhere.
@@ -42,10 +43,17 @@ def write_report(folder: Path) -> Path:
     Raises:
         ConfigError: no such folder, no `summary.json` in it, or files that cannot be read.
     """
+    from proxcgal.apps.campaign_page import campaign_page
     from proxcgal.apps.page import page
-    from proxcgal.apps.stored import read_runs
+    from proxcgal.apps.stored import read_campaign, read_runs, read_sweep
+    from proxcgal.apps.sweep_page import sweep_page
 
-    runs, about = read_runs(folder)
+    if sweep := read_sweep(folder):
+        text = sweep_page(sweep)
+    elif campaign := read_campaign(folder):
+        text = campaign_page(campaign)
+    else:
+        text = page(*read_runs(folder))
     path = folder / "report.html"
-    write_text(path, page(runs, about))
+    write_text(path, text)
     return path

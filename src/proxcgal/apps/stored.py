@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -70,7 +70,91 @@ class Run:
     settings: str = ""  # scenario.toml: the resolved scenario
 
 
+class StoredCell(_Stored):
+    """One cell of the timing grid."""
+
+    robot: str
+    vertices: int
+    cloud: str
+    points: int
+    algorithm: int
+    method: str
+    median_us: float
+    p99_us: float
+    max_us: float
+
+
+class Exponent(_Stored):
+    """How a time grows, and how the paper's formula does."""
+
+    exponent: float
+    low: float | None = None
+    high: float | None = None
+    formula: float
+
+
+class StoredGrowth(_Stored):
+    """Of one robot, algorithm and method."""
+
+    robot: str
+    algorithm: int
+    method: str
+    vertices: Exponent | None = None
+    points: Exponent | None = None
+
+
+class StoredSweep(_Stored):
+    """`summary.json` of the timing grid."""
+
+    machine: str
+    cells: list[StoredCell]
+    growth: list[StoredGrowth] = []
+
+
+@dataclass(frozen=True, slots=True)
+class Sweep:
+    """What a timing grid's folder holds."""
+
+    folder: Path
+    summary: StoredSweep
+    about: About
+
+
+@dataclass(frozen=True, slots=True)
+class StoredCampaign:
+    """What a campaign's folder holds, its trials apart."""
+
+    folder: Path
+    summary: dict[str, Any]  # as the kind of the campaign has it
+    about: About
+
+
 M = TypeVar("M", bound=BaseModel)
+
+
+def read_campaign(folder: Path) -> StoredCampaign | None:
+    """The campaign of a folder; None where its summary is of something else.
+
+    Raises:
+        ConfigError: no such folder, no summary in it, or files that cannot be read; all problems.
+    """
+    made, summary = folder / "run.json", _json(folder / "summary.json")
+    if "campaign" not in summary:
+        return None
+    return StoredCampaign(folder, summary, _model(About, made) if made.is_file() else About())
+
+
+def read_sweep(folder: Path) -> Sweep | None:
+    """The timing grid of a folder; None where its summary is of something else.
+
+    Raises:
+        ConfigError: no such folder, no summary in it, or files that cannot be read; all problems.
+    """
+    path, made = folder / "summary.json", folder / "run.json"
+    if "cells" not in _json(path):
+        return None
+    about = _model(About, made) if made.is_file() else About()
+    return Sweep(folder, _model(StoredSweep, path), about)
 
 
 def read_runs(folder: Path) -> tuple[list[Run], About]:

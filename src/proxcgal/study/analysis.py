@@ -103,13 +103,20 @@ def table(summaries: Sequence[Summary]) -> str:
             cells = [shown(numbers[key]) for key in CONTROLLER_KEYS[:4]]
             last = "" if gain is None else f"{gain:+.0f}"
             rows.append((summary["scenario"], name, *cells, last))
-    widths = [max(len(row[i]) for row in rows) for i in range(len(head))]
+    return aligned(rows, left=2, heads=2)
+
+
+def aligned(rows: Sequence[Sequence[str]], *, left: int, heads: int) -> str:
+    """Rows as lines of columns: the first `left` flush left, a rule below the first `heads`."""
+    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     lines = []
     for row in rows:
-        left = [cell.ljust(width) for cell, width in zip(row[:2], widths[:2], strict=True)]
-        right = [cell.rjust(width) for cell, width in zip(row[2:], widths[2:], strict=True)]
-        lines.append("  ".join(left + right).rstrip())
-    lines.insert(2, "-" * max(map(len, lines)))
+        cells = [
+            cell.ljust(width) if column < left else cell.rjust(width)
+            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ]
+        lines.append("  ".join(cells).rstrip())
+    lines.insert(heads, "-" * max(map(len, lines)))
     return "\n".join(lines)
 
 
@@ -123,11 +130,19 @@ def shown(value: float | None) -> str:
 def write_json(path: Path, content: Mapping[str, Any]) -> None:
     """Strict JSON (no NaN), whole or not at all: written beside and moved into place.
 
+    Raises: as `as_json`.
+    """
+    write_bytes(path, as_json(content))
+
+
+def as_json(content: Mapping[str, Any]) -> bytes:
+    """Strict JSON (no NaN), as a file's bytes.
+
     Raises:
         ValueError: a number that is not finite, which JSON cannot hold.
     """
     text = json.dumps(content, indent=2, allow_nan=False, default=_plain)
-    write_text(path, text + "\n")
+    return (text + "\n").encode()
 
 
 def write_text(path: Path, text: str) -> None:
@@ -136,16 +151,23 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """A file that is whole or not there: readers never meet half of it."""
+    """A file that is whole or not there, and on the disk once this returns."""
     handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
         Path(name).chmod(0o644)  # mkstemp makes it private
         Path(name).replace(path)
     except BaseException:
         Path(name).unlink(missing_ok=True)
         raise
+    folder = os.open(path.parent, os.O_RDONLY)
+    try:
+        os.fsync(folder)  # the name too
+    finally:
+        os.close(folder)
 
 
 def _number(value: Any) -> float | int | None:
