@@ -10,7 +10,7 @@
 int main(int argc, char** argv) {
   using namespace proxcgal;  // NOLINT(google-build-using-namespace)
   const int ticks = argc > 1 ? std::atoi(argv[1]) : 0;
-  const auto robot = test::arm();
+  const auto robot = test::arm(6, 70, 140);
   const Skin skin = test::ring(30);
   ControllerConfig config;
   config.tasks = {JointLimits{}, Avoidance{}, MinimumAltitude{}, Reach{}};
@@ -36,7 +36,11 @@ int main(int argc, char** argv) {
       scans[s].counter = static_cast<std::uint32_t>(i);
       scans[s].stamp = time;
       scans[s].status.fill(5);
-      for (double& range : scans[s].ranges) range = uniform(0.05, 1.25);
+      // A wall that turns with the ticks, a little rough, as sensors see one.
+      const double slope = uniform(-0.05, 0.05), wall = uniform(0.5, 0.9);
+      for (int zone = 0; zone < kZones; ++zone)
+        scans[s].ranges[static_cast<std::size_t>(zone)] =
+            wall + slope * (zone % 8) + uniform(-0.01, 0.01);
     }
     q += config.period * controller.tick(time, q, scans, goal).qd;
   }

@@ -2,6 +2,7 @@
 //
 //     bench_pipeline CELL.bin ... [--benchmark_filter=tick] [--benchmark_out=FILE]
 //
+// Cells with one scan of each sensor are for the stages, cells with many for the ticks.
 // Names tell stage, question, robot, resolution and size: tick/scans/ur10e_10000_raw/points=1580.
 #include <chrono>
 #include <cstdio>
@@ -16,6 +17,7 @@ namespace {
 
 constexpr double kTickBudget = 150.0, kLargeBudget = 5000.0, kWorstBudget = 66'700.0;  // [us]
 constexpr int kTicks = 5000;
+constexpr double kSway = 0.05;  // [rad]
 
 std::string named(const char* what, const Cell& cell, Eigen::Index points) {
   return std::string(what) + '/' + cell.name + "/points=" + std::to_string(points);
@@ -29,30 +31,28 @@ void add(const std::string& name, int iterations, Run run) {
       ->Unit(benchmark::kMicrosecond);
 }
 
-/// `factor` clouds in one: what many more sensors would see, each a little off.
-Points many(const Points& points, int factor) {
+/// As many points as asked for, of several clouds: what more sensors would see, each a little off.
+Points many(const Points& points, Eigen::Index n) {
   std::mt19937_64 engine(0);
   std::normal_distribution<double> noise(0.0, 0.01);
-  Points out(points.rows() * factor, 3);
-  for (int copy = 0; copy < factor; ++copy) {
-    for (Eigen::Index i = 0; i < points.rows(); ++i) {
-      for (int k = 0; k < 3; ++k)
-        out(copy * points.rows() + i, k) = points(i, k) + (copy == 0 ? 0.0 : noise(engine));
-    }
+  Points out(n, 3);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (int k = 0; k < 3; ++k)
+      out(i, k) = points(i % points.rows(), k) + (i < points.rows() ? 0.0 : noise(engine));
   }
   return out;
 }
 
 void add_stages(const Cell& cell) {
-  add(named("sense/points", cell, static_cast<Eigen::Index>(cell.scans.size()) * kZones), 2000,
-      [&cell](benchmark::State& state) {
+  add(named("sense/points", cell, static_cast<Eigen::Index>(cell.skin.mounts.size()) * kZones),
+      2000, [&cell](benchmark::State& state) {
         const Sense sense(cell.skin.model);
         SensedPoints out;
         Samples samples;
         for (auto _ : state) {
           samples.take(state, [&] {
-            for (const Scan& scan : cell.scans) {
-              sense(scan, out);
+            for (std::size_t s = 0; s < cell.skin.mounts.size(); ++s) {
+              sense(cell.scans[s], out);
               benchmark::DoNotOptimize(out);
             }
           });
@@ -119,36 +119,110 @@ void add_stages(const Cell& cell) {
       });
 }
 
-/// Each tick gets a new scan of every sensor: the most that there can be to do.
+/// Each tick gets a new scan of every sensor, with noise of its own, while the arm sways: the most
+/// that there can be to do.
 void add_tick(const Cell& cell, const char* name, const std::vector<TaskSpec>& tasks) {
-  add(named(name, cell, static_cast<Eigen::Index>(cell.scans.size()) * kZones), kTicks,
-      [&cell, tasks](benchmark::State& state) {
+  const std::size_t sensors = cell.skin.mounts.size();
+  add(named(name, cell, static_cast<Eigen::Index>(sensors) * kZones), kTicks,
+      [&cell, tasks, sensors](benchmark::State& state) {
         ControllerConfig config;
         config.tasks = tasks;
         Controller controller(cell.robot, cell.skin, config);
         std::vector<Scan> scans = cell.scans;
-        const JointVector q = cell.posture.q;
+        JointVector q = cell.posture.q;
         double time = 0.0;
+        std::uint32_t counter = 0;
+        std::size_t batch = 0;
         Samples samples;
         for (auto _ : state) {
           time += config.period;
-          for (Scan& scan : scans) {
-            ++scan.counter;
-            scan.stamp = time;
+          ++counter;
+          batch = (batch + sensors) % scans.size();
+          for (std::size_t s = batch; s < batch + sensors; ++s) {
+            scans[s].counter = counter;
+            scans[s].stamp = time;
           }
-          samples.take(
-              state, [&] { benchmark::DoNotOptimize(controller.tick(time, q, scans, cell.goal)); });
+          for (Eigen::Index j = 0; j < q.size(); ++j)
+            q[j] = cell.posture.q[j] + kSway * std::sin(2.0 * time + static_cast<double>(j));
+          samples.take(state, [&] {
+            benchmark::DoNotOptimize(
+                controller.tick(time, q, std::span(scans).subspan(batch, sensors), cell.goal));
+          });
         }
         samples.report(state, kTickBudget);
         state.counters["cloud"] = static_cast<double>(controller.cloud_W().rows());
       });
 }
 
+/// Task rows, solver and command, from the pair on.
+void add_solving(const Cell& cell) {
+  add("solve/avoid_and_reach/" + cell.name, 2000, [&cell](benchmark::State& state) {
+    const Robot& robot = *cell.robot;
+    const ClosestPair pair = closest_pair(robot, cell.posture, cell.environment_W, Method::kFast);
+    ControlPair control;
+    control.link = robot.n_links() - 1;
+    control.control_W = pair.surface_W;
+    control.obstacle_W = pair.obstacle_W;
+    control.distance = 0.25;
+    const Limits limits{robot.q_min(), robot.q_max(), robot.qd_max(), robot.qdd_max()};
+    const JointVector rest = JointVector::Zero(robot.n_q());
+    std::array<BuiltTask, 2> built;
+    std::array<Task, 2> stack;
+    Solution solution;
+    JointVector qd = rest;
+    Samples samples;
+    for (auto _ : state) {
+      samples.take(state, [&] {
+        build_avoidance(Avoidance{}, robot, cell.posture, std::span(&control, 1), built[0]);
+        build_reach(Reach{}, robot, cell.posture, cell.goal, built[1]);
+        for (std::size_t i = 0; i < 2; ++i) stack[i] = built[i].task;
+        solve(stack, robot.n_q(), limits.qd_max, SolverConfig{}, solution);
+        const Admissible box = admissible(limits, cell.posture.q, rest, 0.01);
+        command({solution.rho.data(), 3}, stack, rest, box, qd);
+      });
+      benchmark::DoNotOptimize(qd);
+    }
+    samples.report(state);
+  });
+}
+
+/// Clusters in the middle of every link, in no order, and three links avoided: the worst tick.
+void add_worst_tick(const Cell& cell) {
+  for (const int nearest : {1, 3}) {
+    add("tick/inside_all_links/" + cell.name + "/nearest=" + std::to_string(nearest), 20,
+        [&cell, nearest](benchmark::State& state) {
+          constexpr int n = 192'000;
+          std::mt19937_64 engine(0);
+          std::normal_distribution<double> noise(0.0, 1e-4);
+          Points points(n, 3);
+          for (int i = 0; i < n; ++i) {
+            const int link = static_cast<int>(engine() % unsigned(cell.robot->n_links()));
+            const Vector3 center_W = cell.posture.T_WL[static_cast<std::size_t>(link)] *
+                                     cell.robot->tree(link).bounds().center;
+            for (int k = 0; k < 3; ++k) points(i, k) = center_W[k] + noise(engine);
+          }
+          ControllerConfig config;
+          config.tasks = {Avoidance{.nearest = nearest}, Reach{}};
+          Controller controller(cell.robot, Skin{}, config);
+          double time = 0.0;
+          Samples samples;
+          for (auto _ : state) {
+            time += config.period;
+            samples.take(state, [&] {
+              benchmark::DoNotOptimize(
+                  controller.tick_known(time, cell.posture.q, points, cell.goal));
+            });
+          }
+          samples.report(state, kWorstBudget);
+        });
+  }
+}
+
 void add_large(const Cell& cell) {
-  for (const int factor : {1, 10, 100}) {
-    const auto points = std::make_shared<Points>(many(cell.environment_W, factor));
-    add(named("distance/many", cell, points->rows()), factor == 100 ? 200 : 1000,
-        [&cell, points, factor](benchmark::State& state) {
+  for (const int n : {1920, 19'200, 192'000}) {
+    const auto points = std::make_shared<Points>(many(cell.environment_W, n));
+    add(named("distance/many", cell, n), n == 192'000 ? 200 : 1000,
+        [&cell, points, n](benchmark::State& state) {
           Samples samples;
           for (auto _ : state) {
             samples.take(state, [&] {
@@ -156,7 +230,7 @@ void add_large(const Cell& cell) {
                   closest_pair(*cell.robot, cell.posture, *points, Method::kFast));
             });
           }
-          samples.report(state, factor == 100 ? kLargeBudget : 0.0);
+          samples.report(state, n == 192'000 ? kLargeBudget : 0.0);
         });
   }
 }
@@ -219,8 +293,10 @@ void add_sphere() {
           Samples samples;
           ClosestPair pair;
           for (auto _ : state) {
-            samples.take(state,
-                         [&] { pair = closest_pair(robot, posture, points, Method::kFast); });
+            samples.take(state, [&] {
+              std::int64_t steps = kSearchSteps;
+              pair = closest_pair(robot, posture, points, Method::kFast, {.steps = &steps});
+            });
           }
           samples.report(state, kWorstBudget);
           state.counters["lower_bound"] = pair.lower_bound ? 1 : 0;
@@ -271,13 +347,18 @@ int main(int argc, char** argv) {
     return 2;
   }
   for (const Cell& cell : cells) {
+    if (cell.scans.size() > cell.skin.mounts.size()) {  // many scans: for the ticks
+      add_tick(cell, "tick/scans", {Avoidance{}, Reach{}});
+      add_tick(
+          cell, "tick/five_tasks",
+          {JointLimits{}, Avoidance{.nearest = 3}, MinimumAltitude{}, Manipulability{}, Reach{}});
+      continue;
+    }
     add_stages(cell);
-    add_tick(cell, "tick/scans", {Avoidance{}, Reach{}});
-    add_tick(
-        cell, "tick/five_tasks",
-        {JointLimits{}, Avoidance{.nearest = 3}, MinimumAltitude{}, Manipulability{}, Reach{}});
     add_large(cell);
+    add_solving(cell);
     add_adversarial(cell);
+    add_worst_tick(cell);
     add_loading(cell);
   }
   add_sphere();

@@ -49,13 +49,17 @@ void bind_config(nanobind::module_& m) {
           [](const FilterConfig& c) { return choice_name(c.confirmation, kConfirmations); },
           "'off', 'zones' or 'scans'.")
       .def_ro("z_min", &FilterConfig::z_min, "[m] world height below which points are cropped.");
-  nb::class_<MonitorConfig>(m, "MonitorConfig", "Freshness bounds of the monitor.")
+  nb::class_<MonitorConfig>(m, "MonitorConfig", "Bounds of the monitor.")
       .def(
           "__init__",
           [](MonitorConfig* self, double degraded_after, double hold_after, double degraded_scale,
-             int clean_cycles, int missed_deadlines) {
-            const MonitorConfig config{degraded_after, hold_after, degraded_scale, clean_cycles,
-                                       missed_deadlines};
+             int clean_cycles, int missed_deadlines, int suspect_repeats, double fresh_within,
+             double approach_speed, double blind_speed, double joints_hold_after,
+             double joints_stop_after, double stuck_after) {
+            const MonitorConfig config{degraded_after,    hold_after,        degraded_scale,
+                                       clean_cycles,      missed_deadlines,  suspect_repeats,
+                                       fresh_within,      approach_speed,    blind_speed,
+                                       joints_hold_after, joints_stop_after, stuck_after};
             config.validate();
             new (self) MonitorConfig(config);
           },
@@ -63,16 +67,37 @@ void bind_config(nanobind::module_& m) {
           "hold_after"_a = MonitorConfig{}.hold_after,
           "degraded_scale"_a = MonitorConfig{}.degraded_scale,
           "clean_cycles"_a = MonitorConfig{}.clean_cycles,
-          "missed_deadlines"_a = MonitorConfig{}.missed_deadlines)
+          "missed_deadlines"_a = MonitorConfig{}.missed_deadlines,
+          "suspect_repeats"_a = MonitorConfig{}.suspect_repeats,
+          "fresh_within"_a = MonitorConfig{}.fresh_within,
+          "approach_speed"_a = MonitorConfig{}.approach_speed,
+          "blind_speed"_a = MonitorConfig{}.blind_speed,
+          "joints_hold_after"_a = MonitorConfig{}.joints_hold_after,
+          "joints_stop_after"_a = MonitorConfig{}.joints_stop_after,
+          "stuck_after"_a = MonitorConfig{}.stuck_after)
       .def_ro("degraded_after", &MonitorConfig::degraded_after,
               "[s] age at which one silent sensor degrades the mode.")
       .def_ro("hold_after", &MonitorConfig::hold_after,
-              "[s] age at which the silence of all sensors holds the arm.")
+              "[s] age at which the silence of an array holds the arm.")
       .def_ro("degraded_scale", &MonitorConfig::degraded_scale,
               "[-] of the speed limits while degraded.")
       .def_ro("clean_cycles", &MonitorConfig::clean_cycles,
               "Cycles without a cause before HOLD or DEGRADED clears.")
-      .def_ro("missed_deadlines", &MonitorConfig::missed_deadlines, "In a row, before HOLD.");
+      .def_ro("missed_deadlines", &MonitorConfig::missed_deadlines, "In a row, before HOLD.")
+      .def_ro("suspect_repeats", &MonitorConfig::suspect_repeats,
+              "Equal payloads in a row that make a sensor suspect, 0 for never.")
+      .def_ro("fresh_within", &MonitorConfig::fresh_within,
+              "[s] a scan of this age is trusted as it is.")
+      .def_ro("approach_speed", &MonitorConfig::approach_speed,
+              "[m/s] assumed of what moves in: shortens the trusted distance past fresh_within.")
+      .def_ro("blind_speed", &MonitorConfig::blind_speed,
+              "[m/s] at most into what a silent sensor covered; 0 at hold_after.")
+      .def_ro("joints_hold_after", &MonitorConfig::joints_hold_after,
+              "[s] age of the joint state that holds the arm.")
+      .def_ro("joints_stop_after", &MonitorConfig::joints_stop_after,
+              "[s] age of the joint state that stops it.")
+      .def_ro("stuck_after", &MonitorConfig::stuck_after,
+              "[s] of avoidance not executed inside d_min, before HOLD.");
   nb::class_<ControllerConfig>(
       m, "ControllerConfig",
       "Everything the controller is set up with; `tasks` in order of priority.")

@@ -1,5 +1,6 @@
 #include <nanobind/stl/map.h>
 
+#include <limits>
 #include <map>
 
 #include "named_pair.hpp"
@@ -15,6 +16,13 @@ struct NamedFinding {
   std::optional<std::string> link;
 };
 
+/// A kept tick whose findings tell their links by name.
+struct NamedRecord {
+  TickRecord record;
+  std::string link;
+  std::vector<NamedFinding> findings;
+};
+
 struct Report {
   std::string name;
   Eigen::VectorXd rate, activation, residual;
@@ -28,6 +36,7 @@ struct Output {
   std::optional<Vector3> control_W;
   double control_distance = kInfinity;
   std::string control_link;
+  double trusted_distance = kInfinity;
   Mode mode;
   std::vector<NamedFinding> findings;
   std::vector<Report> tasks;
@@ -36,6 +45,23 @@ struct Output {
 
 std::string link_name(const Robot& robot, int link) {
   return link < 0 ? "" : robot.spec().links[static_cast<std::size_t>(link)].name;
+}
+
+NamedFinding named_finding(const Robot& robot, const Finding& finding) {
+  return {finding, finding.link < 0 ? std::nullopt : std::optional(link_name(robot, finding.link))};
+}
+
+std::vector<NamedRecord> last_ticks(const Controller& controller) {
+  std::vector<NamedRecord> out;
+  for (const TickRecord& record : controller.last_ticks()) {
+    NamedRecord next{record, link_name(controller.robot(), record.link), {}};
+    const auto n =
+        std::min<std::size_t>(static_cast<std::size_t>(record.n_findings), record.findings.size());
+    for (std::size_t i = 0; i < n; ++i)
+      next.findings.push_back(named_finding(controller.robot(), record.findings[i]));
+    out.push_back(std::move(next));
+  }
+  return out;
 }
 
 Output kept(const Controller& controller, const TickOutput& out) {
@@ -47,10 +73,10 @@ Output kept(const Controller& controller, const TickOutput& out) {
   if (out.control.link >= 0) copy.control_W = out.control.control_W;
   copy.control_distance = out.control.distance;
   copy.control_link = link_name(robot, out.control.link);
+  copy.trusted_distance = out.trusted_distance;
   copy.mode = out.mode;
   for (const Finding& finding : controller.findings()) {
-    copy.findings.push_back(
-        {finding, finding.link < 0 ? std::nullopt : std::optional(link_name(robot, finding.link))});
+    copy.findings.push_back(named_finding(robot, finding));
   }
   for (int i = 0; i < out.n_tasks; ++i) {
     const TaskReport& task = out.tasks[static_cast<std::size_t>(i)];
@@ -67,12 +93,13 @@ Output kept(const Controller& controller, const TickOutput& out) {
 }
 
 Output tick(Controller& controller, double time, nb::handle q, const std::vector<Scan>& scans,
-            nb::handle goal, bool late) {
+            nb::handle goal, bool late, std::optional<double> q_stamp) {
   // Values that are not finite are findings of the tick; only what is no array at all is an error.
   const JointVector joints = vector_from(q, "q", controller.robot().n_q(), Take::kExact, false);
   const Pose T_WT = pose_from(goal, "goal", Take::kExact, false);
   const nb::gil_scoped_release release;
-  return kept(controller, controller.tick(time, joints, scans, T_WT, late));
+  const double measured = q_stamp.value_or(std::numeric_limits<double>::quiet_NaN());
+  return kept(controller, controller.tick(time, joints, scans, T_WT, late, measured));
 }
 
 Output tick_known(Controller& controller, double time, nb::handle q, nb::handle points,
@@ -158,6 +185,22 @@ void bind_output(nb::module_& m) {
         return text + ", age=" + std::to_string(f.finding.age) +
                ", count=" + std::to_string(f.finding.count) + ")";
       });
+  nb::class_<NamedRecord>(m, "TickRecord", "What is kept of one tick.")
+      .def_prop_ro(
+          "time", [](const NamedRecord& r) { return r.record.time; }, "[s] the caller's.")
+      .def_prop_ro("mode", [](const NamedRecord& r) { return r.record.mode; })
+      .def_prop_ro(
+          "q", [](const NamedRecord& r) { return Eigen::VectorXd(r.record.q); }, "(n_q,) measured.")
+      .def_prop_ro(
+          "qd", [](const NamedRecord& r) { return Eigen::VectorXd(r.record.qd); },
+          "(n_q,) commanded.")
+      .def_prop_ro(
+          "distance", [](const NamedRecord& r) { return r.record.distance; },
+          "[m] of the pair, inf for none.")
+      .def_ro("link", &NamedRecord::link, "Of the pair; empty for none.")
+      .def_prop_ro("sensor", [](const NamedRecord& r) { return r.record.origin.sensor; })
+      .def_prop_ro("zone", [](const NamedRecord& r) { return r.record.origin.zone; })
+      .def_ro("findings", &NamedRecord::findings, "The first eight.");
   nb::class_<Report>(m, "TaskReport", "What one task wanted and got in this tick, row by row.")
       .def_ro("name", &Report::name)
       .def_ro("rate", &Report::rate, "(m,) reference rate.")
@@ -177,6 +220,9 @@ void bind_output(nb::module_& m) {
       .def_ro("control_distance", &Output::control_distance,
               "[m] from that point to the obstacle; inf for none.")
       .def_ro("control_link", &Output::control_link, "Its link; empty for none.")
+      .def_ro("trusted_distance", &Output::trusted_distance,
+              "[m] the pair's, less the way that something may have come since its scan was fresh; "
+              "negative where the obstacle is inside the surface; inf for none.")
       .def_ro("mode", &Output::mode)
       .def_ro("findings", &Output::findings)
       .def_ro("tasks", &Output::tasks, "One report a task, in order of priority.")
@@ -203,17 +249,23 @@ void bind_controller(nanobind::module_& m) {
           },
           "robot"_a, "skin"_a, "config"_a = ControllerConfig{})
       .def("tick", &tick, "time"_a, "q"_a, "scans"_a, "goal"_a, "late"_a = false,
+           "q_stamp"_a = nb::none(),
            "One cycle from what the sensors sent.\n\n"
            "Args:\n    time: the caller's monotonic clock [s].\n    q: (n_q,) float64, measured "
            "[rad or m].\n"
            "    scans: those since the last tick, may be empty.\n    goal: (4, 4) float64, T_WT.\n "
-           "   late: the caller missed its deadline.\n\n"
+           "   late: the caller missed its deadline.\n    q_stamp: when q was measured, on the "
+           "same clock "
+           "[s]; None: just now.\n\n"
            "Raises:\n    GeometryError: an array of the wrong shape or type. Bad values are "
            "findings, not errors.")
       .def("tick_known", &tick_known, "time"_a, "q"_a, "points_W"_a, "goal"_a,
            "velocity_W"_a = nb::none(),
            "One cycle from points (n, 3) of the scene itself; `velocity_W` (3,) is the obstacle's "
            "[m/s].")
+      .def("last_ticks", &last_ticks,
+           "The last 64 ticks, the oldest first. After a STOP they stay as they were when it came, "
+           "until `reset`.")
       .def(
           "cloud_W", [](const Controller& c) { return Points(c.cloud_W()); },
           "(n, 3) filtered cloud of the last tick, in world [m].")

@@ -37,7 +37,8 @@ nb::object remove_body_all(const Robot& robot, nb::handle q, nb::handle origins,
   const Eigen::VectorXd per_point = nb::try_cast(tolerance, same)
                                         ? Eigen::VectorXd::Constant(n, same)
                                         : vector_from(tolerance, "tolerance", n, Take::kConvert);
-  if (!((per_point.array() >= 0.0).all())) throw ConfigError("tolerance must be 0 m or more");
+  if (!per_point.allFinite() || !((per_point.array() >= 0.0).all()))
+    throw ConfigError("tolerance must be finite, 0 m or more");
   if (!(min_hit >= 0.0))
     throw ConfigError("min_hit is " + std::to_string(min_hit) + ", allowed is 0 m or more");
   const Method how = choice(method, "method", kMethods);
@@ -63,8 +64,8 @@ NamedPair closest_pair_all(const Robot& robot, nb::handle q, nb::handle points,
   const Method how = choice(method, "method", kMethods);
   const Posture posture = posture_at(robot, q);
   const nb::gil_scoped_release release;
-  return named(robot,
-               closest_pair(robot, posture, points_W(), how, {.steps = steps.value_or(kAnySteps)}));
+  std::int64_t left = steps.value_or(kAnySteps);
+  return named(robot, closest_pair(robot, posture, points_W(), how, {.steps = &left}));
 }
 
 std::vector<NamedPair> closest_pairs_all(const Robot& robot, nb::handle q, nb::handle points) {
@@ -74,7 +75,7 @@ std::vector<NamedPair> closest_pairs_all(const Robot& robot, nb::handle q, nb::h
   std::vector<ClosestPair> pairs(static_cast<std::size_t>(robot.n_links()));
   {
     const nb::gil_scoped_release release;
-    closest_pairs(robot, posture, points_W(), {}, pairs, kAnySteps);
+    closest_pairs(robot, posture, points_W(), {}, pairs);
   }
   std::vector<NamedPair> out;
   for (const ClosestPair& pair : pairs) out.push_back(named(robot, pair));

@@ -80,11 +80,14 @@ inline Eigen::Map<const Points> points_view(const ArrayView& view, const char* n
 }
 
 inline void require_finite(const Eigen::Ref<const Points>& points, const char* name) {
-  if (points.allFinite()) return;
+  // Farther off, squares would leave single precision.
+  constexpr double farthest = 1e9;  // [m]
+  if (points.allFinite() && (points.size() == 0 || points.cwiseAbs().maxCoeff() <= farthest))
+    return;
   for (Eigen::Index i = 0; i < points.rows(); ++i) {
-    if (!points.row(i).allFinite()) {
+    if (!points.row(i).allFinite() || points.row(i).cwiseAbs().maxCoeff() > farthest) {
       throw GeometryError(std::string(name) + " row " + std::to_string(i) +
-                          " is not finite: every coordinate must be [m]");
+                          " is not finite or farther than 1e9 m: every coordinate must be finite [m]");
     }
   }
 }

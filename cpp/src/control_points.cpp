@@ -8,6 +8,9 @@
 namespace proxcgal::detail {
 namespace {
 
+constexpr double kNearerBy = 0.01;  // [m] another link must be, to be taken at once
+constexpr double kLeastTime = 0.1;  // [s] else a link is kept for
+
 ControlPair control_of(const ClosestPair& pair, const Vector3& velocity_W) {
   ControlPair control;
   control.link = pair.link;
@@ -67,12 +70,14 @@ ControlPoints::ControlPoints(const Robot& robot, const Skin& skin, const Control
   chosen_.reserve(std::max<std::size_t>(links_.size(), 1));
 }
 
-std::optional<ClosestPair> ControlPoints::nearest(const Robot& robot, const Posture& posture,
-                                                  const PointsRef& cloud_W, double engaged_within,
+std::optional<ClosestPair> ControlPoints::nearest(double time, const Robot& robot,
+                                                  const Posture& posture, const PointsRef& cloud_W,
+                                                  double d_min, double engaged_within,
                                                   Monitor& monitor) {
   const auto controllable = [&](const ClosestPair& pair) {
     return row_norm(robot, posture, control_of(pair, Vector3::Zero())) >= min_row_norm_;
   };
+  steps_ = kSearchSteps;
   // What was passed over a moment ago most likely will be again: the others are asked first.
   ClosestPair best;
   const auto first_passed = std::partition(links_.begin(), links_.end(), [&](int link) {
@@ -82,18 +87,23 @@ std::optional<ClosestPair> ControlPoints::nearest(const Robot& robot, const Post
   passed_.clear();
   while (asked_end != links_.begin()) {
     const std::span<const int> asked(links_.begin(), asked_end);
-    best = closest_pair(robot, posture, cloud_W, method_, {.links = asked, .before = before_});
+    best = closest_pair(robot, posture, cloud_W, method_,
+                        {.links = asked, .before = before_, .steps = &steps_});
     if (!best.found()) return std::nullopt;
     if (controllable(best)) break;
     passed_.push_back(best);
     best = {};
-    std::iter_swap(std::find(links_.begin(), asked_end, passed_.back().link), --asked_end);
+    const auto passed = std::find(links_.begin(), asked_end, passed_.back().link);
+    --asked_end;
+    std::iter_swap(passed, asked_end);
   }
   for (auto link = first_passed; link != links_.end(); ++link) {
     ClosestPair& before = per_link_[static_cast<std::size_t>(link - links_.begin())];
-    const ClosestPair nearer =
-        closest_pair(robot, posture, cloud_W, method_,
-                     {.links = std::span(&*link, 1), .before = before, .within = best.distance});
+    const ClosestPair nearer = closest_pair(robot, posture, cloud_W, method_,
+                                            {.links = std::span(&*link, 1),
+                                             .before = before,
+                                             .within = best.distance,
+                                             .steps = &steps_});
     before = nearer;
     if (!nearer.found()) continue;
     if (controllable(nearer)) {
@@ -114,10 +124,41 @@ std::optional<ClosestPair> ControlPoints::nearest(const Robot& robot, const Post
     link_passed = pair.link;
   }
   before_ = best;
-  if (best.lower_bound) note(monitor, Reason::kDistanceBounded, best.link);
-  if (best.found()) return best;
+  if (best.lower_bound) note(monitor, Reason::kWorkBounded, best.link);
+  if (best.found()) return settled(time, robot, posture, cloud_W, d_min, best);
   if (nearest_passed < engaged_within) note(monitor, Reason::kNoControllableLink, link_passed);
   return std::nullopt;
+}
+
+ClosestPair ControlPoints::settled(double time, const Robot& robot, const Posture& posture,
+                                   const PointsRef& cloud_W, double d_min,
+                                   const ClosestPair& nearest) {
+  if (nearest.link == link_) return nearest;
+  const bool may_stay = link_ >= 0 && time - switched_ < kLeastTime && nearest.distance >= d_min &&
+                        !passed_over_[static_cast<std::size_t>(link_)];
+  if (may_stay) {
+    const ClosestPair same = closest_pair(
+        robot, posture, cloud_W, method_,
+        {.links = std::span(&link_, 1), .within = nearest.distance + kNearerBy, .steps = &steps_});
+    if (same.found()) return same;
+  }
+  link_ = nearest.link;
+  switched_ = time;
+  return nearest;
+}
+
+ClosestPair ControlPoints::nearest_of(const Robot& robot, const Posture& posture,
+                                      const PointsRef& rows_W, double within) {
+  ClosestPair best;
+  for (const int link : links_) {
+    if (passed_over_[static_cast<std::size_t>(link)]) continue;
+    const ClosestPair pair = closest_pair(robot, posture, rows_W, method_,
+                                          {.links = std::span(&link, 1),
+                                           .within = std::min(within, best.distance),
+                                           .steps = &steps_});
+    if (pair.found()) best = pair;
+  }
+  return best;
 }
 
 std::span<const ControlPair> ControlPoints::sensor(const Skin& skin, const Posture& posture,
@@ -148,9 +189,12 @@ std::span<const ControlPair> ControlPoints::sensor(const Skin& skin, const Postu
 
 std::span<const ControlPair> ControlPoints::links(const Robot& robot, const Posture& posture,
                                                   const PointsRef& cloud_W, int count,
-                                                  const Vector3& velocity_W) {
+                                                  const Vector3& velocity_W, Monitor& monitor) {
   chosen_.clear();
-  closest_pairs(robot, posture, cloud_W, links_, per_link_);
+  closest_pairs(robot, posture, cloud_W, links_, per_link_, &steps_);
+  for (const ClosestPair& pair : per_link_) {
+    if (pair.lower_bound) note(monitor, Reason::kWorkBounded, pair.link);
+  }
   sorted_.assign(per_link_.begin(), per_link_.end());
   std::sort(sorted_.begin(), sorted_.end(),
             [](const auto& x, const auto& y) { return x.distance < y.distance; });
@@ -162,10 +206,9 @@ std::span<const ControlPair> ControlPoints::links(const Robot& robot, const Post
   return chosen_;
 }
 
-std::span<const ControlPair> ControlPoints::one(const ClosestPair& pair,
-                                                const Vector3& velocity_W) {
+std::span<const ControlPair> ControlPoints::one(const ControlPair& control) {
   chosen_.clear();
-  chosen_.push_back(control_of(pair, velocity_W));
+  chosen_.push_back(control);
   return chosen_;
 }
 

@@ -17,28 +17,43 @@ class ControlPoints {
   ControlPoints(const Robot& robot, const Skin& skin, const ControllerConfig& config);
 
   /// The nearest pair whose link joints can move away; what was passed over is noted.
+  ///
+  /// The link stays the same for a while: it changes at once where another is nearer by 10 mm or
+  /// inside `d_min`, else at most every 100 ms.
+  /// @param time            [s] of the controller's own clock
+  /// @param d_min           [m]
   /// @param engaged_within  having no such link is a cause to hold when nearer than this [m]
-  std::optional<ClosestPair> nearest(const Robot& robot, const Posture& posture,
-                                     const PointsRef& cloud_W, double engaged_within,
+  std::optional<ClosestPair> nearest(double time, const Robot& robot, const Posture& posture,
+                                     const PointsRef& cloud_W, double d_min, double engaged_within,
                                      Monitor& monitor);
+  /// The nearest of some rows of the cloud only, over the links that were not passed over.
+  /// @param within  [m] only a nearer pair counts
+  ClosestPair nearest_of(const Robot& robot, const Posture& posture, const PointsRef& rows_W,
+                         double within);
   /// SM baseline ([WA] ref. 31): the sensor mounting point nearest to the cloud.
   std::span<const ControlPair> sensor(const Skin& skin, const Posture& posture,
                                       const PointsRef& cloud_W, const Vector3& velocity_W);
   /// The `count` nearest links that joints can move away, one pair each, nearest first.
   std::span<const ControlPair> links(const Robot& robot, const Posture& posture,
-                                     const PointsRef& cloud_W, int count,
-                                     const Vector3& velocity_W);
+                                     const PointsRef& cloud_W, int count, const Vector3& velocity_W,
+                                     Monitor& monitor);
   /// A pair that is known already.
-  std::span<const ControlPair> one(const ClosestPair& pair, const Vector3& velocity_W);
+  std::span<const ControlPair> one(const ControlPair& control);
 
  private:
+  ClosestPair settled(double time, const Robot& robot, const Posture& posture,
+                      const PointsRef& cloud_W, double d_min, const ClosestPair& nearest);
+
   Method method_;
   double min_row_norm_;
   std::vector<int> links_;         // rows of the links that count, the passed over ones last
   std::vector<char> passed_over_;  // [link] was it a moment ago, because its row was too small
   std::vector<ClosestPair> passed_;
-  std::vector<int> sensor_link_;  // row of each sensor's link, -1 where no joint moves it
-  ClosestPair before_;            // the last that was returned: where the next search begins
+  std::vector<int> sensor_link_;       // row of each sensor's link, -1 where no joint moves it
+  std::int64_t steps_ = kSearchSteps;  // that this tick's searches may still take
+  int link_ = -1;                      // that avoidance acted on last
+  double switched_ = -kInfinity;       // [s] when that last changed
+  ClosestPair before_;                 // the last that was returned: where the next search begins
   std::vector<ClosestPair> per_link_, sorted_;
   std::vector<ControlPair> chosen_;
 };

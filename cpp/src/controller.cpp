@@ -16,6 +16,18 @@ constexpr double kLongestStep = 0.5;  // [s] a longer one between two ticks is a
 constexpr double kExecuted = 0.5;     // share of the demanded rate that counts as executed
 constexpr double kEngaged = 0.5;      // activation from which avoidance must be executed
 constexpr double kRigid = 1e-6;       // how far a goal's rotation may be from orthonormal
+constexpr double kFarthest = 1e9;     // [m] squares stay far inside single precision
+constexpr double kInto = 0.02;        // [m/s] slower motion into the unseen holds nothing up
+
+/// Middle and corners of a sensor's field of view, in its frame.
+std::array<Vector3, 5> view_directions(const SensorModel& model) {
+  const double edge = std::tan(0.5 * model.field_of_view);
+  std::array<Vector3, 5> directions{Vector3(0, 0, 1), Vector3(edge, edge, 1),
+                                    Vector3(-edge, edge, 1), Vector3(edge, -edge, 1),
+                                    Vector3(-edge, -edge, 1)};
+  for (Vector3& direction : directions) direction.normalize();
+  return directions;
+}
 
 bool is_rigid(const Pose& T) {
   return T.matrix().allFinite() &&
@@ -38,6 +50,14 @@ struct Controller::Impl {
   bool started = false;
   double caller_time = 0.0, clock = 0.0;
 
+  std::array<Vector3, 5> view_S;
+  std::optional<Avoidance> avoidance;   // the first of the stack
+  double stuck_since = -1.0;            // [s] internal, negative while avoidance is executed
+  Vector3 outward_W = Vector3::Zero();  // last normal of a pair that was surely outside
+  std::array<TickRecord, kKeptTicks> kept;
+  std::size_t n_kept = 0;  // ever
+  bool frozen = false;     // STOP came: what led to it stays
+
   JointVector qd_last;
   Posture posture;
   std::array<BuiltTask, kMaxLevels> built;
@@ -53,11 +73,16 @@ struct Controller::Impl {
         perception(robot, skin, config.filter, config.method),
         control_points(*robot, skin, config),
         limits{robot->q_min(), robot->q_max(), robot->qd_max(), robot->qdd_max()},
+        view_S(view_directions(skin.model)),
         posture(robot->make_posture()) {
     for (const TaskSpec& task : config.tasks) proxcgal::validate(task, *robot);
     if (!limits.qd_max.allFinite() || !limits.qdd_max.allFinite()) {
       throw ConfigError("robot '" + robot->spec().name +
                         "' has a joint without a speed or acceleration limit: give both");
+    }
+    for (const TaskSpec& task : config.tasks) {
+      const auto* spec = std::get_if<Avoidance>(&task);
+      if (spec != nullptr && !avoidance) avoidance = *spec;
     }
     qd_last = JointVector::Zero(robot->n_q());
     out.qd = qd_last;
@@ -93,9 +118,16 @@ struct Controller::Impl {
   }
 
   /// Joint state and goal are usable; else the reason is noted.
-  bool usable(const JointVector& q, const Pose& goal) {
+  bool usable(double time, const JointVector& q, double q_stamp, const Pose& goal) {
     const bool joints = q.size() == robot->n_q() && q.allFinite();
     if (!joints) note(Reason::kJointStateInvalid);
+    Finding stale;
+    stale.age = time - q_stamp;  // not a number: just measured
+    if (stale.age > config.monitor.joints_hold_after) {
+      stale.reason = stale.age > config.monitor.joints_stop_after ? Reason::kJointStateLost
+                                                                  : Reason::kJointStateStale;
+      monitor.add(stale);
+    }
     const bool rigid = is_rigid(goal);
     if (!rigid) note(Reason::kGoalInvalid);
     return joints && rigid;
@@ -107,12 +139,108 @@ struct Controller::Impl {
     if (config.control_point == ControlPoint::kSensor) {
       controls = control_points.sensor(skin, posture, cloud_W, velocity_W);
     } else if (spec.nearest > 1) {
-      controls = control_points.links(*robot, posture, cloud_W, spec.nearest, velocity_W);
+      controls = control_points.links(*robot, posture, cloud_W, spec.nearest, velocity_W, monitor);
     } else if (out.pair) {
-      controls = control_points.one(*out.pair, velocity_W);
+      controls = control_points.one(control_of_pair(velocity_W));
     }
     if (!controls.empty()) out.control = controls.front();
     build_avoidance(spec, *robot, posture, controls, task);
+  }
+
+  /// The pair as avoidance takes it: the trusted distance, and a normal that never turns over.
+  ControlPair control_of_pair(const Vector3& velocity_W) const {
+    ControlPair control;
+    control.link = out.pair->link;
+    control.control_W = out.pair->surface_W;
+    control.obstacle_W = out.pair->obstacle_W;
+    control.obstacle_velocity_W = velocity_W;
+    control.distance = out.trusted_distance;
+    control.fallback_normal_W = outward_W;
+    return control;
+  }
+
+  /// Is the pair's distance to be shortened, or turned over?
+  void trust(const PointsRef& cloud_W, bool sensed) {
+    const Vector3 apart =
+        out.pair ? Vector3(out.pair->surface_W - out.pair->obstacle_W) : Vector3(Vector3::Zero());
+    out.trusted_distance = out.pair ? out.pair->distance : kInfinity;
+    if (!sensed) {
+      if (out.trusted_distance > 0.0) outward_W = apart.normalized();
+      return;
+    }
+    for (int s = 0; s < perception.sensors(); ++s) {
+      const auto sensor = static_cast<std::size_t>(s);
+      const double late = perception.age(sensor, clock) - config.monitor.fresh_within;
+      const auto [begin, count] = perception.cloud_rows(sensor);
+      if (!(late > 0.0) || count == 0) continue;
+      const double shorter = config.monitor.approach_speed * late;
+      ClosestPair pair = control_points.nearest_of(
+          *robot, posture, cloud_W.middleRows(begin, count), out.trusted_distance + shorter);
+      if (!pair.found()) continue;
+      pair.point += static_cast<int>(begin);
+      out.pair = pair;
+      out.trusted_distance = std::max(pair.distance - shorter, 0.0);
+    }
+    if (!out.pair) return;
+    if (!perception.in_contact()) {
+      if (out.pair->distance > 0.0) {
+        outward_W = (out.pair->surface_W - out.pair->obstacle_W).normalized();
+      }
+      return;
+    }
+    note(Reason::kContact, out.pair->link);
+    // Taken for body, so as near as noise: whether the point measured is in or out of the surface,
+    // the normal that held before does.
+    if (apart.dot(outward_W) < 0.0) out.trusted_distance = -out.pair->distance;
+  }
+
+  /// Which zone must not lose its obstacle to the body filter.
+  void watch() {
+    const bool near = avoidance && out.pair && out.trusted_distance < avoidance->d_min;
+    if (near) {
+      perception.watch({out.pair_origin, out.pair->obstacle_W});
+    } else {
+      perception.watch({});
+    }
+  }
+
+  /// Inside d_min nothing may come nearer, into what is not seen nothing may move fast.
+  void restrain(const Admissible& box, const Vector3& velocity_W) {
+    const bool whole_body = config.control_point == ControlPoint::kWholeBody;
+    if (whole_body && avoidance && out.pair && out.trusted_distance < avoidance->d_min) {
+      const ControlPair control = control_of_pair(velocity_W);
+      const JointVector row = opening_row(*robot, posture, control);
+      keep_rate(row, 0.0, box, out.qd);
+    }
+    for (int s = 0; s < perception.sensors(); ++s) {
+      const auto sensor = static_cast<std::size_t>(s);
+      const double blind = perception.blind_for(sensor, clock, config.monitor);
+      if (blind > config.monitor.degraded_after) slow_into_view(s, blind, box);
+    }
+  }
+
+  void slow_into_view(int s, double blind, const Admissible& box) {
+    const auto sensor = static_cast<std::size_t>(s);
+    const int link = perception.link(sensor);
+    const Pose T_WS = posture.T_WL[static_cast<std::size_t>(link)] * perception.T_LS(sensor);
+    Jacobian6 J;
+    robot->jacobian(posture, link, T_WS.translation(), J);
+    const double from = config.monitor.degraded_after, to = config.monitor.hold_after;
+    const double share = to > from ? std::clamp((to - blind) / (to - from), 0.0, 1.0) : 0.0;
+    const double allowed = share * config.monitor.blind_speed;
+    double into = 0.0;
+    for (const Vector3& view : view_S) {
+      const JointVector row = -(J.topRows<3>().transpose() * (T_WS.linear() * view));
+      into = std::max(into, -row.dot(out.qd));
+      keep_rate(row, -allowed, box, out.qd);
+    }
+    if (blind > to && into > kInto) {
+      Finding finding;
+      finding.reason = Reason::kBlindMotion;
+      finding.sensor = s;
+      finding.age = blind;
+      monitor.add(finding);
+    }
   }
 
   void build_stack(const PointsRef& cloud_W, const Vector3& velocity_W, const Pose& goal) {
@@ -161,10 +289,20 @@ struct Controller::Impl {
         const bool engaged = task.activation[row] > kEngaged && task.rate[row] > 0.0;
         if (engaged && missing[row] > kExecuted * task.rate[row]) {
           note(Reason::kNotExecuted, out.control.link);
+          // Outside d_min the goal may well hold against it: there the arm may come to rest.
+          const bool inside = out.trusted_distance < avoidance->d_min;
+          if (!inside) {
+            stuck_since = -1.0;
+          } else if (stuck_since < 0.0) {
+            stuck_since = clock;
+          } else if (clock - stuck_since > config.monitor.stuck_after) {
+            note(Reason::kAvoidanceStuck, out.control.link);
+          }
           return;
         }
       }
     }
+    stuck_since = -1.0;
   }
 
   /// What each task wanted, and what is missing of it in the command that is issued.
@@ -177,20 +315,25 @@ struct Controller::Impl {
   }
 
   /// From the joint state and a cloud to an admissible velocity.
-  void act(const JointVector& q, const PointsRef& cloud_W, const Vector3& velocity_W,
+  /// @param sensed  the cloud is the sensors', row by row
+  void act(const JointVector& q, const PointsRef& cloud_W, bool sensed, const Vector3& velocity_W,
            const Pose& goal) {
     detail::Stopwatch watch(config.timings);
     robot->update(q, posture);
-    out.pair = control_points.nearest(*robot, posture, cloud_W, engaged_within(), monitor);
+    const double d_min = avoidance ? avoidance->d_min : 0.0;
+    out.pair =
+        control_points.nearest(clock, *robot, posture, cloud_W, d_min, engaged_within(), monitor);
+    trust(cloud_W, sensed);
     build_stack(cloud_W, velocity_W, goal);
     out.timings.distance_us = watch.lap_us();
     const std::span<const Task> tasks(stack.data(), config.tasks.size());
     solve(tasks, robot->n_q(), limits.qd_max, config.solver, solution);
-    const Mode mode = monitor.mode();  // of the last tick: this one's findings are not complete yet
-    const double scale = mode == Mode::kDegraded ? config.monitor.degraded_scale : 1.0;
+    // By the last tick's mode: this one's findings are not complete yet.
+    const double scale = monitor.slowed() ? config.monitor.degraded_scale : 1.0;
     const Admissible box = admissible(limits, q, qd_last, config.period, scale);
     command({solution.rho.data(), static_cast<std::size_t>(solution.levels) + 1}, tasks, qd_last,
             box, out.qd);
+    restrain(box, velocity_W);
     out.timings.solve_us = watch.lap_us();
     judge();
     if ((q.array() < limits.q_min.array() || q.array() > limits.q_max.array()).any())
@@ -202,10 +345,30 @@ struct Controller::Impl {
     out.mode = monitor.conclude();
     if (!usable || out.mode >= Mode::kHold) {
       const JointVector& at = usable ? q : posture.q;  // the last posture that could be trusted
-      decelerate(qd_last, admissible(limits, at, qd_last, config.period, 1.0), out.qd);
+      const Admissible box = admissible(limits, at, qd_last, config.period, 1.0);
+      decelerate(qd_last, box, out.qd);
+      if (usable) restrain(box, Vector3::Zero());
     }
     qd_last = out.qd;
     if (usable) report();
+    remember(q);
+  }
+
+  void remember(const JointVector& q) {
+    if (frozen) return;
+    TickRecord& record = kept[n_kept++ % kKeptTicks];
+    record.time = caller_time;
+    record.mode = out.mode;
+    record.q = q.size() == robot->n_q() ? q : JointVector::Constant(robot->n_q(), kInfinity);
+    record.qd = out.qd;
+    record.distance = out.pair ? out.pair->distance : kInfinity;
+    record.link = out.pair ? out.pair->link : -1;
+    record.origin = out.pair_origin;
+    record.n_findings = static_cast<int>(monitor.findings().size());
+    const auto first =
+        monitor.findings().first(std::min(monitor.findings().size(), record.findings.size()));
+    std::copy(first.begin(), first.end(), record.findings.begin());
+    frozen = out.mode == Mode::kStop;
   }
 
   void begin(double time, bool late) {
@@ -214,6 +377,7 @@ struct Controller::Impl {
     advance(time);
     out.pair.reset();
     out.pair_origin = {};
+    out.trusted_distance = kInfinity;
     out.control = {};
     out.timings = {};
     for (int level = 0; level < out.n_tasks; ++level)
@@ -228,19 +392,20 @@ Controller::Controller(std::shared_ptr<const Robot> robot, Skin skin, Controller
 Controller::~Controller() = default;
 
 const TickOutput& Controller::tick(double time, const JointVector& q, std::span<const Scan> scans,
-                                   const Pose& goal, bool late) {
+                                   const Pose& goal, bool late, double q_stamp) {
   Impl& me = *impl_;
   detail::Stopwatch watch(me.config.timings);
   me.begin(time, late);
-  const bool usable = me.usable(q, goal);
+  const bool usable = me.usable(time, q, q_stamp, goal);
   if (usable) {
     me.perception.update(me.clock, me.clock - me.caller_time, q, scans, me.monitor);
     me.out.timings.sense_us = me.perception.sense_us;
     me.out.timings.filter_us = me.perception.filter_us;
     me.perception.check_freshness(me.clock, me.config.monitor, me.monitor);
-    me.act(q, me.perception.cloud_W(), Vector3::Zero(), goal);
+    me.act(q, me.perception.cloud_W(), true, Vector3::Zero(), goal);
     if (me.out.pair)
       me.out.pair_origin = me.perception.origins()[static_cast<std::size_t>(me.out.pair->point)];
+    me.watch();
   }
   me.conclude(q, usable);
   me.out.timings.total_us = watch.lap_us();
@@ -253,12 +418,13 @@ const TickOutput& Controller::tick_known(double time, const JointVector& q,
   Impl& me = *impl_;
   detail::Stopwatch watch(me.config.timings);
   me.begin(time, false);
-  bool usable = me.usable(q, goal);
-  if (points_W.rows() > me.config.max_points || !points_W.allFinite() || !velocity_W.allFinite()) {
+  bool usable = me.usable(time, q, std::numeric_limits<double>::quiet_NaN(), goal);
+  if (points_W.rows() > me.config.max_points || !points_W.allFinite() || !velocity_W.allFinite() ||
+      (points_W.size() > 0 && points_W.cwiseAbs().maxCoeff() > kFarthest)) {
     me.note(Reason::kPointsInvalid);
     usable = false;
   }
-  if (usable) me.act(q, points_W, velocity_W, goal);
+  if (usable) me.act(q, points_W, false, velocity_W, goal);
   me.conclude(q, usable);
   me.out.timings.total_us = watch.lap_us();
   return me.out;
@@ -279,6 +445,17 @@ std::vector<double> Controller::scan_ages(double time) const {
 const Robot& Controller::robot() const { return *impl_->robot; }
 const Skin& Controller::skin() const { return impl_->skin; }
 const ControllerConfig& Controller::config() const { return impl_->config; }
-bool Controller::reset() { return impl_->monitor.reset(); }
+std::vector<TickRecord> Controller::last_ticks() const {
+  const std::size_t n = std::min<std::size_t>(impl_->n_kept, kKeptTicks);
+  std::vector<TickRecord> records;
+  for (std::size_t back = n; back > 0; --back)
+    records.push_back(impl_->kept[(impl_->n_kept - back) % kKeptTicks]);
+  return records;
+}
+bool Controller::reset() {
+  const bool left = impl_->monitor.reset();
+  if (left) impl_->frozen = false;
+  return left;
+}
 
 }  // namespace proxcgal

@@ -10,6 +10,24 @@ namespace {
 
 constexpr double kStampSlack = 1e-3;  // [s] a stamp this far in the future is clock resolution
 constexpr double kOldestStamp = 0.5;  // [s] an older scan says nothing of now
+// [m] from scan to scan, at most: what is watched comes near, it does not jump. Farther off it is
+// another thing that came into the zone's view, the arm itself as a rule.
+constexpr double kNearEnough = 0.08;
+constexpr int kTelling = 4;  // zones with a target: noise makes two equal payloads unlikely
+
+/// Sensors of one array carry one name up to its last '/': rows of equal arrays are equal.
+std::string array_name(const Mount& mount) {
+  const auto end = mount.name.rfind('/');
+  return end == std::string::npos ? mount.name : mount.name.substr(0, end);
+}
+int array_of(const Skin& skin, const Mount& mount) {
+  std::vector<std::string> names;
+  for (const Mount& other : skin.mounts) {
+    if (std::find(names.begin(), names.end(), array_name(other)) == names.end())
+      names.push_back(array_name(other));
+  }
+  return static_cast<int>(std::find(names.begin(), names.end(), array_name(mount)) - names.begin());
+}
 
 }  // namespace
 
@@ -45,6 +63,8 @@ Perception::Perception(std::shared_ptr<const Robot> robot, const Skin& skin,
     sensor.link = robot_->link_row(mount.link);
     sensor.T_LS = mount.T_LS;
     for (auto& ranges : sensor.past) ranges.fill(kInfinity);
+    sensor.array = array_of(skin, mount);
+    arrays_ = std::max(arrays_, sensor.array + 1);
     sensors_.push_back(sensor);
   }
   const auto room = sensors_.size() * kZones;
@@ -85,6 +105,7 @@ bool Perception::accept(double time, double delay, const Scan& scan, Monitor& mo
 void Perception::update(double time, double delay, const JointVector& q,
                         std::span<const Scan> scans, Monitor& monitor) {
   history_.push(time, q);
+  steps_ = kSearchSteps;
   sense_us = filter_us = 0.0;
   if (scans.empty()) return;
   double placed = std::numeric_limits<double>::quiet_NaN();  // stamp that `posture_` is at
@@ -95,7 +116,7 @@ void Perception::update(double time, double delay, const JointVector& q,
     // One filter call for all scans of one stamp; a sensor twice in a batch needs two.
     if (scan.stamp != placed || sensors_[static_cast<std::size_t>(scan.sensor)].staged) {
       sense_us += watch.lap_us();
-      filter();
+      filter(monitor);
       filter_us += watch.lap_us();
       placed = scan.stamp;
       robot_->update(history_.at(scan.stamp + delay), posture_);
@@ -104,7 +125,7 @@ void Perception::update(double time, double delay, const JointVector& q,
     sense_us += watch.lap_us();
   }
   Stopwatch watch(timings);
-  filter();
+  filter(monitor);
   gather();
   filter_us += watch.lap_us();
 }
@@ -121,6 +142,10 @@ void Perception::stage(double time, const Scan& scan, Monitor& monitor) {
     finding.count = sensed.invalid;
     monitor.add(finding);
   }
+  const bool same = scan.ranges == sensor.ranges && scan.status == sensor.status;
+  sensor.repeats = same && sensed.count >= kTelling ? sensor.repeats + 1 : 0;
+  sensor.ranges = scan.ranges;
+  sensor.status = scan.status;
   // A scan without one usable zone tells nothing: the sensor's last cloud stays, and its age grows.
   if (sensed.invalid == kZones) return;
   sensor.seen = true;
@@ -150,17 +175,24 @@ void Perception::stage(double time, const Scan& scan, Monitor& monitor) {
   sensor.staged = staged_.count > before;
 }
 
-void Perception::filter() {
+void Perception::filter(Monitor& monitor) {
   if (staged_.count == 0) return;
   const auto n = static_cast<std::size_t>(staged_.count);
   const std::span<bool> keep_mask(staged_.keep.get(), n);
   const std::span<const double> tolerance(staged_.tolerance.data(), n);
   const auto points = staged_.points_W.topRows(staged_.count);
   std::fill(keep_mask.begin(), keep_mask.end(), true);
-  if (config_.surface_margin) remove_near_surface(*robot_, posture_, points, tolerance, keep_mask);
+  const bool complete =
+      config_.surface_margin &&
+      remove_near_surface(*robot_, posture_, points, tolerance, keep_mask, &steps_);
+  if (config_.surface_margin && !complete) {
+    Finding finding;
+    finding.reason = Reason::kWorkBounded;
+    monitor.add(finding);
+  }
   // Algorithm 1 drops only points that lie within their tolerance of a surface: where the margin
   // has dropped all of those, it finds nothing more, and only the literal form is asked still.
-  if (!config_.surface_margin || method_ == Method::kPaper) {
+  if (!complete || method_ == Method::kPaper) {
     remove_body(*robot_, posture_, staged_.origins_W.topRows(staged_.count), points, tolerance,
                 config_.min_hit, method_, keep_mask);
   }
@@ -182,9 +214,15 @@ void Perception::keep(Sensor& sensor, int begin, int end) {
     const auto row = static_cast<std::size_t>(i);
     if (staged_.keep[row]) ranges[static_cast<std::size_t>(staged_.zone[row])] = staged_.range[row];
   }
+  const bool watched = watched_.origin.sensor == staged_.sensor[static_cast<std::size_t>(begin)];
+  if (watched) in_contact_ = false;
   for (int i = begin; i < end; ++i) {
     const auto row = static_cast<std::size_t>(i);
     const int zone = staged_.zone[row];
+    if (watched && zone == watched_.origin.zone && !staged_.keep[row]) {
+      const Vector3 moved = staged_.points_W.row(i).transpose() - watched_.obstacle_W;
+      in_contact_ = staged_.keep[row] = moved.norm() < kNearEnough;
+    }
     if (!staged_.keep[row] || !confirmed(sensor, ranges, zone, staged_.tolerance[row])) continue;
     const auto at = static_cast<std::size_t>(sensor.n_kept++);
     sensor.kept_W[at] = staged_.points_W.row(i).transpose();
@@ -220,7 +258,8 @@ bool Perception::confirmed(const Sensor& sensor, const std::array<double, kZones
 void Perception::gather() {
   n_cloud_ = 0;
   for (int id = 0; id < sensors(); ++id) {
-    const Sensor& sensor = sensors_[static_cast<std::size_t>(id)];
+    Sensor& sensor = sensors_[static_cast<std::size_t>(id)];
+    sensor.cloud_begin = n_cloud_;
     for (int i = 0; i < sensor.n_kept; ++i) {
       origins_[static_cast<std::size_t>(n_cloud_)] = {id, sensor.zone[static_cast<std::size_t>(i)]};
       cloud_.row(n_cloud_++) = sensor.kept_W[static_cast<std::size_t>(i)].transpose();
@@ -241,12 +280,27 @@ double Perception::age(std::size_t sensor, double time) const {
   return sensors_[sensor].seen ? time - sensors_[sensor].received : kInfinity;
 }
 
+double Perception::blind_for(std::size_t sensor, double time, const MonitorConfig& config) const {
+  const bool suspect =
+      config.suspect_repeats > 0 && sensors_[sensor].repeats >= config.suspect_repeats;
+  return suspect ? kInfinity : age(sensor, time);
+}
+
 void Perception::check_freshness(double time, const MonitorConfig& config, Monitor& monitor) const {
   // A skin without sensors sees nothing: to the arm that is the same as silence.
   double youngest = kInfinity;
   for (std::size_t id = 0; id < sensors_.size(); ++id) {
     const double old = age(id, time);
     youngest = std::min(youngest, old);
+    const int repeats = sensors_[id].repeats;
+    if (config.suspect_repeats > 0 && repeats >= config.suspect_repeats) {
+      Finding finding;
+      finding.reason = Reason::kSensorSuspect;
+      finding.sensor = static_cast<int>(id);
+      finding.age = old;
+      finding.count = repeats;
+      monitor.add(finding);
+    }
     if (!(old > config.degraded_after)) continue;
     Finding finding;
     finding.reason = Reason::kSensorSilent;
@@ -259,6 +313,20 @@ void Perception::check_freshness(double time, const MonitorConfig& config, Monit
     finding.reason = Reason::kAllSensorsSilent;
     finding.age = youngest;
     monitor.add(finding);
+    return;
+  }
+  for (int array = 0; array < arrays_; ++array) {
+    Finding finding;
+    finding.reason = Reason::kArraySilent;
+    finding.age = kInfinity;
+    finding.count = 0;
+    for (std::size_t id = 0; id < sensors_.size(); ++id) {
+      if (sensors_[id].array != array) continue;
+      if (finding.count++ == 0) finding.sensor = static_cast<int>(id);
+      finding.age = std::min(finding.age, age(id, time));
+    }
+    // A single sensor is no array: its silence slows by direction.
+    if (finding.count > 1 && finding.age > config.hold_after) monitor.add(finding);
   }
 }
 

@@ -44,6 +44,24 @@ class Perception {
   /// Gathered when asked for: no tick needs it.
   Eigen::Map<const Points> raw_cloud_W() const;
   double age(std::size_t sensor, double time) const;  ///< [s] since receipt
+  /// [s] since the sensor last told anything that can be believed.
+  double blind_for(std::size_t sensor, double time, const MonitorConfig& config) const;
+  const Pose& T_LS(std::size_t sensor) const { return sensors_[sensor].T_LS; }
+  int link(std::size_t sensor) const { return sensors_[sensor].link; }
+  /// Rows of the cloud that came from one sensor: first, count.
+  std::pair<Eigen::Index, Eigen::Index> cloud_rows(std::size_t sensor) const {
+    return {sensors_[sensor].cloud_begin, sensors_[sensor].n_kept};
+  }
+
+  /// A pair inside the distance to keep: if its zone's next point is taken for body, close to where
+  /// the obstacle was, it stays in the cloud. The default forgets it.
+  struct Watched {
+    PointOrigin origin;
+    Vector3 obstacle_W = Vector3::Zero();
+  };
+  void watch(const Watched& watched) { watched_ = watched; }
+  /// Is the watched pair in the cloud only because it was watched?
+  bool in_contact() const { return in_contact_; }
   int sensors() const { return static_cast<int>(sensors_.size()); }
   double sense_us = 0, filter_us = 0;  ///< of the last update, where timings are on
   bool timings = false;
@@ -56,6 +74,11 @@ class Perception {
     bool seen = false;     // one with a usable zone came
     bool staged = false;   // one waits for the filter
     std::uint32_t counter = 0;
+    int array = -1;                       // sensors of one array share it
+    int repeats = 0;                      // equal payloads in a row
+    std::array<double, kZones> ranges{};  // of the last scan
+    std::array<std::uint8_t, kZones> status{};
+    Eigen::Index cloud_begin = 0;  // its rows of the cloud
     double received = 0.0;
     int n_raw = 0, n_kept = 0;
     std::array<Vector3, kZones> raw_W, kept_W;
@@ -67,7 +90,7 @@ class Perception {
 
   bool accept(double time, double delay, const Scan& scan, Monitor& monitor);
   void stage(double time, const Scan& scan, Monitor& monitor);
-  void filter();
+  void filter(Monitor& monitor);
   void keep(Sensor& sensor, int begin, int end);
   bool confirmed(const Sensor& sensor, const std::array<double, kZones>& ranges, int zone,
                  double tolerance) const;
@@ -79,8 +102,12 @@ class Perception {
   Method method_;
   double mesh_error_ = 0.0;  // of the worst link: added to every tolerance
   std::vector<Sensor> sensors_;
+  int arrays_ = 0;
+  Watched watched_;
+  bool in_contact_ = false;
   JointHistory history_;
-  Posture posture_;  // where the arm was at the stamp being placed
+  std::int64_t steps_ = kSearchSteps;  // that this tick's filter may still take
+  Posture posture_;                    // where the arm was at the stamp being placed
 
   // Points of the scans of one stamp, side by side.
   struct Staged {

@@ -72,7 +72,8 @@ void check(const RobotSpec& spec) {
 std::vector<MeshTree> trees_of(const RobotSpec& spec) {
   std::vector<std::future<MeshTree>> building;
   for (const LinkSpec& link : spec.links) {
-    building.push_back(std::async(std::launch::async,
+    // Deferred where no thread can be had.
+    building.push_back(std::async(std::launch::async | std::launch::deferred,
                                   [&link] { return MeshTree(link.vertices_L, link.triangles); }));
   }
   std::vector<MeshTree> trees;

@@ -7,14 +7,14 @@
 namespace proxcgal::test {
 
 /// Six joints like an arm's, links as bumpy boxes and spheres: no data package needed.
-inline std::shared_ptr<Robot> arm(int joints = 6) {
+inline std::shared_ptr<Robot> arm(int joints = 6, int rings = 12, int segments = 16) {
   RobotSpec spec;
   spec.name = "arm";
   const auto add_link = [&](int joint, double length) {
     LinkSpec link;
     link.name = "link" + std::to_string(joint + 1);
     link.joint = joint;
-    auto mesh = bumpy_sphere(12, 16, 0.06, 0.008);
+    auto mesh = bumpy_sphere(rings, segments, 0.06, 0.008);
     mesh.vertices.col(2) *= 0.5 * length / 0.06;
     mesh.vertices.col(2).array() += 0.5 * length;
     link.vertices_L = mesh.vertices;

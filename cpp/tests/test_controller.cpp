@@ -32,7 +32,8 @@ Pose goal_near(const Robot& robot, const JointVector& q) {
 }
 
 /// Scans of a room of changing depth; the noise makes the closest pair jump.
-std::vector<Scan> scans(Random& random, int sensors, std::uint32_t counter, double stamp) {
+std::vector<Scan> scans(Random& random, int sensors, std::uint32_t counter, double stamp,
+                        double nearest = 0.15) {
   std::vector<Scan> out;
   for (int s = 0; s < sensors; ++s) {
     Scan scan;
@@ -40,7 +41,7 @@ std::vector<Scan> scans(Random& random, int sensors, std::uint32_t counter, doub
     scan.counter = counter;
     scan.stamp = stamp;
     scan.status.fill(5);
-    for (double& range : scan.ranges) range = random.uniform(0.15, 1.2);
+    for (double& range : scan.ranges) range = random.uniform(nearest, 1.2);
     out.push_back(scan);
   }
   return out;
@@ -162,7 +163,7 @@ TEST(Controller, SilenceOfAllSensorsHoldsTheArmWithin200Milliseconds) {
   const JointVector q = bent();
   const Pose goal = goal_near(*robot, q);
   for (int i = 0; i < 100; ++i) {
-    const auto batch = i % 7 == 0 ? scans(random, 10, static_cast<std::uint32_t>(i), 0.01 * i)
+    const auto batch = i % 7 == 0 ? scans(random, 10, static_cast<std::uint32_t>(i), 0.01 * i, 1.0)
                                   : std::vector<Scan>{};
     controller.tick(0.01 * i, q, batch, goal);
   }
@@ -174,6 +175,191 @@ TEST(Controller, SilenceOfAllSensorsHoldsTheArmWithin200Milliseconds) {
     }
   }
   EXPECT_EQ(mode, Mode::kHold);
+}
+
+bool found(const Controller& controller, Reason reason) {
+  const auto findings = controller.findings();
+  return std::any_of(findings.begin(), findings.end(),
+                     [&](const Finding& finding) { return finding.reason == reason; });
+}
+
+TEST(Controller, SilenceOfOneArrayHoldsTheArmWithin200Milliseconds) {
+  const auto robot = test::arm();
+  Skin skin = test::ring(10);
+  for (std::size_t s = 0; s < 10; ++s)
+    skin.mounts[s].name = (s < 5 ? "front/" : "back/") + std::to_string(s);
+  Controller controller(robot, skin, ControllerConfig{});
+  Random random(21);
+  const JointVector q = bent();
+  const Pose goal = goal_near(*robot, q);
+  Mode mode = Mode::kRun;
+  for (int i = 0; i < 100; ++i) {
+    auto batch = scans(random, 10, static_cast<std::uint32_t>(i), 0.01 * i, 1.0);
+    if (i >= 60) batch.resize(5);  // the second array goes silent, its last scan came at 0.59 s
+    mode = controller.tick(0.01 * i, q, batch, goal).mode;
+    if (i == 70) {
+      EXPECT_EQ(mode, Mode::kRun);
+    }
+    if (i == 79) {
+      EXPECT_EQ(mode, Mode::kHold);
+      EXPECT_TRUE(found(controller, Reason::kArraySilent));
+    }
+  }
+}
+
+TEST(Controller, TheSamePayloadAgainAndAgainIsSuspect) {
+  const auto robot = test::arm();
+  Controller controller(robot, test::ring(), ControllerConfig{});
+  Random random(22);
+  const JointVector q = bent();
+  const Pose goal = goal_near(*robot, q);
+  const auto stuck = scans(random, 10, 0, 0.0, 1.0);
+  for (int i = 0; i < 20; ++i) {
+    auto batch = scans(random, 10, static_cast<std::uint32_t>(i), 0.01 * i, 1.0);
+    batch[3].ranges = stuck[3].ranges;
+    const Mode mode = controller.tick(0.01 * i, q, batch, goal).mode;
+    EXPECT_EQ(found(controller, Reason::kSensorSuspect), i >= 5);
+    if (i < 5) {
+      EXPECT_EQ(mode, Mode::kRun);
+    } else {
+      EXPECT_GE(mode, Mode::kDegraded);
+    }
+  }
+}
+
+TEST(Controller, AnOldJointStateHoldsAndAtLastStops) {
+  const auto robot = test::arm();
+  Controller controller(robot, test::ring(), ControllerConfig{});
+  Random random(23);
+  const JointVector q = bent();
+  const Pose goal = goal_near(*robot, q);
+  const auto at = [&](int i, double age) {
+    const auto batch = scans(random, 10, static_cast<std::uint32_t>(i), 0.01 * i, 1.0);
+    return controller.tick(0.01 * i, q, batch, goal, false, 0.01 * i - age).mode;
+  };
+  EXPECT_EQ(at(0, 0.0), Mode::kRun);
+  EXPECT_EQ(at(1, 0.019), Mode::kRun);
+  EXPECT_EQ(at(2, 0.021), Mode::kHold);
+  EXPECT_EQ(at(3, 0.101), Mode::kStop);
+  const auto kept = controller.last_ticks();
+  ASSERT_EQ(kept.size(), 4U);
+  EXPECT_EQ(kept.back().mode, Mode::kStop);
+  EXPECT_EQ(kept.back().findings[0].reason, Reason::kJointStateLost);
+  EXPECT_EQ(at(4, 0.0), Mode::kStop);  // latched, and what led to it stays
+  EXPECT_EQ(controller.last_ticks().size(), 4U);
+  EXPECT_TRUE(controller.reset());
+  EXPECT_EQ(at(5, 0.0), Mode::kHold);
+  EXPECT_EQ(controller.last_ticks().size(), 5U);
+}
+
+TEST(Controller, InsideTheLeastDistanceNothingComesNearer) {
+  const auto robot = test::arm();
+  ControllerConfig config;
+  config.monitor.stuck_after = 1e9;
+  Random random(24);
+  int inside = 0;
+  for (int trial = 0; trial < 40; ++trial) {
+    Controller controller(robot, Skin{}, config);
+    JointVector q = test::posture(random, 6);
+    const Pose goal = goal_near(*robot, test::posture(random, 6));
+    const Points points = test::cloud(random, 40, 1.0);
+    Posture posture = robot->make_posture();
+    JointVector before = JointVector::Zero(6);
+    for (int i = 0; i < 60; ++i) {
+      const TickOutput& out = controller.tick_known(0.01 * i, q, points, goal);
+      robot->update(q, posture);
+      if (out.pair && out.pair->distance < 0.2 && out.pair->distance > 1e-6) {
+        ControlPair pair;
+        pair.link = out.pair->link;
+        pair.control_W = out.pair->surface_W;
+        pair.obstacle_W = out.pair->obstacle_W;
+        pair.distance = out.pair->distance;
+        const JointVector row = opening_row(*robot, posture, pair);
+        const Limits limits{robot->q_min(), robot->q_max(), robot->qd_max(), robot->qdd_max()};
+        const Admissible box = admissible(limits, q, before, config.period);
+        JointVector best = before;  // as fast outward as the box allows at all
+        for (Eigen::Index j = 0; j < 6; ++j) best[j] = row[j] > 0.0 ? box.high[j] : box.low[j];
+        EXPECT_GE(row.dot(out.qd), std::min(0.0, row.dot(best)) - 1e-9);
+        ++inside;
+      }
+      before = out.qd;
+      q += config.period * out.qd;
+    }
+  }
+  EXPECT_GT(inside, 300);
+}
+
+TEST(Controller, AnObstacleThatTouchesIsNotTakenForBody) {
+  const auto robot = test::arm();
+  Skin skin = test::ring(1);
+  // It stands off the link that carries it, and looks back at it: the surface is at 0.25 m.
+  Pose& T_LS = skin.mounts[0].T_LS;
+  T_LS.translation() = Vector3(0.31, 0.0, 0.15);
+  T_LS.linear().col(2) = -Vector3::UnitX();
+  T_LS.linear().col(1) = T_LS.linear().col(2).cross(Vector3(T_LS.linear().col(0)));
+  Controller controller(robot, skin, ControllerConfig{});
+  const JointVector q = bent();
+  Posture posture = robot->make_posture();
+  robot->update(q, posture);
+  const Pose goal = posture.T_WT;
+  int kept = 0;
+  for (int i = 0; i < 60; ++i) {
+    Scan scan;
+    scan.counter = static_cast<std::uint32_t>(i);
+    scan.stamp = 0.07 * i;
+    scan.status.fill(255);
+    const double range = std::min(0.08 + 0.005 * i, 0.25);
+    scan.ranges[27] = range;
+    scan.status[27] = 5;
+    const TickOutput& out = controller.tick(0.07 * i, q, std::span(&scan, 1), goal);
+    ASSERT_TRUE(out.pair.has_value()) << "lost at " << range << " m";
+    if (!found(controller, Reason::kContact)) continue;
+    ++kept;
+    EXPECT_GE(out.mode, Mode::kDegraded);
+    EXPECT_LT(out.trusted_distance, 0.05);
+  }
+  EXPECT_GT(kept, 10);
+  // Seen far off again, it is an obstacle like any other.
+  Scan scan;
+  scan.counter = 60;
+  scan.stamp = 4.2;
+  scan.status.fill(255);
+  scan.ranges[27] = 0.1;
+  scan.status[27] = 5;
+  controller.tick(4.2, q, std::span(&scan, 1), goal);
+  EXPECT_FALSE(found(controller, Reason::kContact));
+}
+
+TEST(Controller, MotionIntoWhatASilentSensorSawIsHeld) {
+  const auto robot = test::arm();
+  Skin skin = test::ring(10);
+  Controller controller(robot, skin, ControllerConfig{});
+  Random random(25);
+  JointVector q = bent();
+  Posture posture = robot->make_posture();
+  robot->update(q, posture);
+  const int link = robot->link_row("link3");
+  // The goal lies where sensor 0 looks.
+  Pose goal = posture.T_WT;
+  const Vector3 view_W =
+      (posture.T_WL[static_cast<std::size_t>(link)] * skin.mounts[0].T_LS).linear().col(2);
+  goal.translation() += 0.5 * view_W;
+  bool held = false;
+  for (int i = 0; i < 100; ++i) {
+    auto batch = scans(random, 10, static_cast<std::uint32_t>(i), 0.01 * i, 1.0);
+    if (i >= 40) batch.erase(batch.begin());
+    const TickOutput& out = controller.tick(0.01 * i, q, batch, goal);
+    if (i < 40) {
+      EXPECT_EQ(out.mode, Mode::kRun);
+    }
+    held = held || (out.mode == Mode::kHold && found(controller, Reason::kBlindMotion));
+    if (held) {
+      EXPECT_LE(i, 60);
+      break;
+    }
+    q += 0.01 * out.qd;
+  }
+  EXPECT_TRUE(held);
 }
 
 TEST(Controller, ARepeatedOrOlderScanIsRefused) {

@@ -49,6 +49,23 @@ TEST_F(EverySetOfInstructions, FindsTheSameHitToTheBit) {
   }
 }
 
+TEST_F(EverySetOfInstructions, GivesTheSameBoundsAndAnswers) {
+  for (int i = 0; i < 20000; ++i) {
+    const Vector3 p = random.vector(0.5);
+    const int steps = i % 100;
+    EXPECT_EQ(bits_of(best.squared_lower_bound(bvh.view(), p.data(), steps)),
+              bits_of(kPortableKernels.squared_lower_bound(bvh.view(), p.data(), steps)));
+    std::int64_t steps_a = 1'000'000, steps_b = steps_a;
+    const double squared = random.uniform(0.0, 0.1);
+    EXPECT_EQ(best.within(bvh.view(), p.data(), squared, steps_a),
+              kPortableKernels.within(bvh.view(), p.data(), squared, steps_b));
+    EXPECT_EQ(steps_a, steps_b);
+    const Vector3 direction = (random.vector(0.2) - p).normalized();
+    EXPECT_EQ(bits_of(best.any_hit(bvh.view(), p.data(), direction.data(), 0.0, 1.0)),
+              bits_of(kPortableKernels.any_hit(bvh.view(), p.data(), direction.data(), 0.0, 1.0)));
+  }
+}
+
 TEST_F(EverySetOfInstructions, SortsOutTheSameRows) {
   for (int i = 0; i < 2000; ++i) {
     ChunkView chunk;

@@ -145,6 +145,42 @@ TEST(MeshTree, ASearchWithoutStepsTellsSo) {
   EXPECT_LT(spent, 0);
 }
 
+TEST(MeshTree, ASideOfAlmostNothingIsNoSide) {
+  for (const double height : {1e-38, 1e-40, 1e-42}) {
+    Points vertices(64, 3);
+    for (int i = 0; i < 64; ++i) vertices.row(i) << i % 8, i / 8, i < 8 ? height : 0.0;
+    Triangles triangles(98, 3);
+    for (int i = 0, f = 0; i < 49; ++i) {
+      const int a = i / 7 * 8 + i % 7;
+      triangles.row(f++) << a, a + 1, a + 8;
+      triangles.row(f++) << a + 1, a + 9, a + 8;
+    }
+    const MeshTree tree(vertices, triangles);
+    EXPECT_NEAR(tree.nearest(Vector3(3.3, 4.4, 2.0))->squared_distance, 4.0, 1e-12);
+  }
+  auto far = test::box({1.0, 1.0, 1.0});
+  far.vertices(0, 0) = 2e9;
+  EXPECT_THROW(MeshTree(far.vertices, far.triangles), GeometryError);
+}
+
+/// Each is a little nearer to nothing than the last: the usual splits would peel off one at a time.
+TEST(MeshTree, AChainOfEverSmallerStepsIsWalked) {
+  constexpr int n = 2000;
+  Points vertices(3 * n, 3);
+  Triangles triangles(n, 3);
+  double y = 1e-8;
+  for (int i = 0; i < n; ++i, y *= 0.9375) {
+    vertices.row(3 * i) << -1, -y, -1;
+    vertices.row(3 * i + 1) << 1, -y, -1;
+    vertices.row(3 * i + 2) << 0, -y, 1;
+    triangles.row(i) << 3 * i, 3 * i + 1, 3 * i + 2;
+  }
+  const MeshTree tree(vertices, triangles);
+  EXPECT_NEAR(tree.nearest(Vector3(0, 1, 0))->squared_distance, 1.0, 1e-7);
+  EXPECT_TRUE(tree.within(Vector3(0, 0.5, 0), 0.6));
+  EXPECT_NEAR(tree.first_hit(Vector3(0, 1, 0), Vector3(0, -1, 0)), 1.0, 1e-7);
+}
+
 TEST(MeshTree, FacesWithoutAreaAreLeftOutAndCounted) {
   auto mesh = test::box({1.0, 1.0, 1.0});
   mesh.triangles.row(3) << 1, 1, 2;

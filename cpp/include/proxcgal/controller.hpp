@@ -75,12 +75,28 @@ struct TickOutput {
   /// point is a row of `cloud_W` (`tick`) or of the points given (`tick_known`).
   std::optional<ClosestPair> pair;
   PointOrigin pair_origin;  ///< sensor and zone that saw it, where one did
-  ControlPair control;      ///< what the first avoidance row acts on
+  /// [m] what of the pair's distance is still to be trusted: less the way that something may have
+  /// come since the scan was fresh, negative where the obstacle is inside the surface.
+  double trusted_distance = kInfinity;
+  ControlPair control;  ///< what the first avoidance row acts on
   Mode mode = Mode::kRun;
   int n_tasks = 0;
   std::array<TaskReport, kMaxLevels> tasks;
   Timings timings;
 };
+
+/// What is kept of one tick, for whoever asks why the arm stopped.
+struct TickRecord {
+  double time = 0.0;  ///< [s] the caller's
+  Mode mode = Mode::kRun;
+  JointVector q, qd;
+  double distance = kInfinity;  ///< [m] of the pair
+  int link = -1;
+  PointOrigin origin;
+  int n_findings = 0;  ///< all of them; the first are kept
+  std::array<Finding, 8> findings{};
+};
+inline constexpr int kKeptTicks = 64;
 
 /// The tick: sense -> filter -> distance -> task -> solve -> command, under the monitor.
 ///
@@ -98,8 +114,10 @@ class Controller {
   /// @param scans  since the last tick, may be empty
   /// @param goal   T_WT
   /// @param late   the caller missed its deadline since the last tick
+  /// @param q_stamp  [s] when q was measured, on the same clock; not a number: just now
   const TickOutput& tick(double time, const JointVector& q, std::span<const Scan> scans,
-                         const Pose& goal, bool late = false);
+                         const Pose& goal, bool late = false,
+                         double q_stamp = std::numeric_limits<double>::quiet_NaN());
   /// The scene itself instead of scans.
   /// @param points_W    (n, 3), n <= max_points
   /// @param velocity_W  of the obstacle, zero where it is not known [m/s]
@@ -114,6 +132,9 @@ class Controller {
   /// Every point of the sensors' last scans before body removal, in world.
   Eigen::Map<const Points> raw_cloud_W() const;
   std::vector<double> scan_ages(double time) const;  ///< [s] per sensor, infinity where none came
+  /// The last ticks, at most kKeptTicks, the oldest first. After a STOP they stay as they were when
+  /// it came, until `reset`.
+  std::vector<TickRecord> last_ticks() const;
   /// @}
 
   const Robot& robot() const;

@@ -76,19 +76,26 @@ enum class Mode : std::uint8_t { kRun, kDegraded, kHold, kStop };
 enum class Reason : std::uint8_t {
   kSensorSilent,        ///< no new scan within the freshness bound
   kAllSensorsSilent,    ///< the whole skin silent
+  kArraySilent,         ///< every sensor of one array silent
+  kSensorSuspect,       ///< the same payload again and again under an advancing counter
+  kBlindMotion,         ///< what was solved moves into what a silent sensor covered
   kScanRefused,         ///< unknown sensor, repeated or older counter, stamp in the future
   kZoneInvalid,         ///< not finite, not positive, or a status that is not valid
   kJointStateInvalid,   ///< not finite or of the wrong size
+  kJointStateStale,     ///< older than a control loop may be
+  kJointStateLost,      ///< so old that where the arm is is unknown
   kGoalInvalid,         ///< not finite or not a rigid pose
   kTimeInvalid,         ///< not finite, not later than the last, or over 0.5 s later
   kNoControllableLink,  ///< the nearest link cannot be moved away: its row n'J is too small
   kLinkSkipped,         ///< a nearer link was passed over because its row n'J is too small
   kRowSmall,            ///< a scalar task row had a norm under 0.01 before scaling
   kNotExecuted,         ///< avoidance asked for more than limits or rank allow
+  kAvoidanceStuck,      ///< inside d_min, and not executed for a while
+  kContact,             ///< a pair inside d_min was taken for body since: kept as an obstacle
   kOutsideLimits,       ///< a joint is outside its position limits
   kDeadlineMissed,      ///< the caller's word
   kDeadlinesMissed,     ///< too many in a row
-  kDistanceBounded,     ///< a search was cut short: its distance is a lower bound
+  kWorkBounded,         ///< a search or the filter was cut short: a lower bound, points kept
   kPointsInvalid,       ///< known points or their velocity not finite, or too many
 };
 

@@ -8,6 +8,8 @@ namespace proxcgal::detail {
 namespace {
 
 constexpr int kMostBins = 16, kFewBins = 8;
+constexpr float kFlat = 1e-20F;  // [m] a side so short tells nothing, and its inverse may overflow
+constexpr int kDeep = 24;  // from this depth on parts are halved: the walks' stacks have an end
 constexpr int kFew = 128;  // triangles for which few bins do as well
 
 float round_down(double x) {
@@ -92,19 +94,19 @@ struct Bvh::Builder {
   }
 
   /// Splits so that box area times count is least; by the median where no plane separates.
-  std::pair<Part, Part> split(const Part& whole) {
+  std::pair<Part, Part> split(const Part& whole, int depth) {
     Box spread;
     for (int i = whole.begin; i < whole.end; ++i) {
       const Float4 center = centers[static_cast<std::size_t>(order[i])];
       spread.add({center, center});
     }
     const Float4 extent = spread.high - spread.low;
-    if (whole.size() <= 2 * kWide) return halves(whole, extent);
+    if (whole.size() <= 2 * kWide || depth > kDeep) return halves(whole, extent);
     const int bins = whole.size() > kFew ? kMostBins : kFewBins;
     const auto n_bins = static_cast<std::size_t>(bins);
     Float4 bins_per_metre{};
     for (int k = 0; k < 3; ++k)
-      bins_per_metre[k] = extent[k] > 0.0F ? static_cast<float>(bins) / extent[k] : 0.0F;
+      bins_per_metre[k] = extent[k] > kFlat ? static_cast<float>(bins) / extent[k] : 0.0F;
     const auto bin_of = [&](std::int32_t t, int axis) {
       const Float4 at = (centers[static_cast<std::size_t>(t)] - spread.low) * bins_per_metre;
       return std::min(bins - 1, static_cast<int>(at[axis]));
@@ -128,7 +130,7 @@ struct Bvh::Builder {
     int best_axis = -1, best_bin = -1;
     float best_cost = INFINITY;
     for (int axis = 0; axis < 3; ++axis) {
-      if (!(extent[axis] > 0.0F)) continue;
+      if (!(extent[axis] > kFlat)) continue;
       const auto a = static_cast<std::size_t>(axis);
       std::array<float, kMostBins> right_cost;
       Box right{}, left{};
@@ -186,7 +188,7 @@ struct Bvh::Builder {
   }
 
   /// @return row of the node made
-  std::int32_t make_node(const Part& whole) {
+  std::int32_t make_node(const Part& whole, int depth) {
     std::array<Part, kWide> parts;
     int n = 1;
     parts[0] = whole;
@@ -199,7 +201,7 @@ struct Bvh::Builder {
           largest = i;
       }
       if (largest < 0) break;
-      const auto [left, right] = split(parts[static_cast<std::size_t>(largest)]);
+      const auto [left, right] = split(parts[static_cast<std::size_t>(largest)], depth);
       parts[static_cast<std::size_t>(largest)] = left;
       parts[static_cast<std::size_t>(n++)] = right;
     }
@@ -213,7 +215,8 @@ struct Bvh::Builder {
         node.high[k][lane] = part.box.high[k];
       }
       node.child[lane] = kEmpty;
-      if (lane < n) node.child[lane] = part.size() <= kWide ? make_block(part) : make_node(part);
+      if (lane < n)
+        node.child[lane] = part.size() <= kWide ? make_block(part) : make_node(part, depth + 1);
     }
     out.nodes_[static_cast<std::size_t>(row)] = node;
     return row;
@@ -224,7 +227,7 @@ Bvh::Bvh(const Points& vertices, const Triangles& triangles) {
   scale_ = vertices.cwiseAbs().maxCoeff();
   blocks_.reserve(static_cast<std::size_t>(triangles.rows()) / 2);
   Builder builder(vertices, triangles, *this);
-  builder.make_node(builder.part(0, static_cast<int>(triangles.rows())));
+  builder.make_node(builder.part(0, static_cast<int>(triangles.rows())), 0);
 }
 
 }  // namespace proxcgal::detail

@@ -7,7 +7,8 @@
 namespace proxcgal::detail {
 namespace {
 
-constexpr int kStack = 256;  // depth of the tree times three: far above what 10^7 triangles need
+constexpr int kStack =
+    256;  // three times the depth: the builder ends it below 40 for 10^7 triangles
 
 struct Entry {
   float key;  // lower bound that the box gives

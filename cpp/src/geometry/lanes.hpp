@@ -12,8 +12,8 @@ using Mask4 = std::int64_t __attribute__((vector_size(32)));
 
 inline constexpr int kWide = 4;
 
-/// Single precision that is not below a squared bound.
-inline float not_below(double squared) {
+/// Single precision that is not below a squared bound. Static: a copy for each instruction set.
+static inline float not_below(double squared) {
   const auto rounded = static_cast<float>(squared);
   return static_cast<double>(rounded) < squared ? rounded * 1.0000002F : rounded;
 }

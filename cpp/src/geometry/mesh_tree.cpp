@@ -21,6 +21,7 @@ using Triangle3 = Kernel::Triangle_3;
 using Primitive = CGAL::AABB_triangle_primitive<Kernel, std::vector<Triangle3>::const_iterator>;
 using CgalTree = CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>>;
 
+constexpr double kFarthest = 1e9;  // [m] squares stay far inside single precision
 constexpr std::int64_t kAnySteps = std::numeric_limits<std::int64_t>::max();
 
 Kernel::Point_3 to_cgal(const Vector3& p) { return {p.x(), p.y(), p.z()}; }
@@ -32,6 +33,9 @@ Triangles checked(const PointsRef& vertices, const Eigen::Ref<const Triangles>& 
     if (!vertices.row(i).allFinite()) {
       throw GeometryError("vertex " + std::to_string(i) +
                           " is not finite: every coordinate must be");
+    }
+    if (vertices.row(i).cwiseAbs().maxCoeff() > kFarthest) {
+      throw GeometryError("vertex " + std::to_string(i) + " is farther than 1e9 m from the origin");
     }
   }
   Triangles kept(triangles.rows(), 3);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "geometry/point_chunk.hpp"
 
@@ -55,7 +56,7 @@ class Search {
         posture_(posture),
         points_W_(points_W),
         links_(options.links),
-        steps_(options.steps),
+        steps_(options.steps != nullptr ? *options.steps : any_),
         squared_(options.within * options.within) {}
 
   /// Begins where the pair was a moment ago: in a cloud of the same sensors the same row is near.
@@ -90,7 +91,9 @@ class Search {
 
   /// Asks every point that may be nearer.
   ClosestPair finish() {
-    for (Eigen::Index begin = 0; begin < points_W_.rows(); begin += PointChunk::kRoom) {
+    // A bound of nothing cannot be lowered.
+    for (Eigen::Index begin = 0; begin < points_W_.rows() && left_out_.squared > 0.0;
+         begin += PointChunk::kRoom) {
       const PointChunk chunk(points_W_, begin);
       for_links(robot_, links_, [&](int link) {
         const LinkBox box = box_of(link);
@@ -171,7 +174,8 @@ class Search {
   const Posture& posture_;
   const PointsRef& points_W_;
   std::span<const int> links_;
-  std::int64_t steps_;  // left
+  std::int64_t any_ = std::numeric_limits<std::int64_t>::max();
+  std::int64_t& steps_;  // left
   LeftOut left_out_;
   ClosestPair best_;
   double squared_;  // of the best, or what it must be under
@@ -198,7 +202,7 @@ ClosestPair closest_pair(const Robot& robot, const Posture& posture, const Point
 }
 
 void closest_pairs(const Robot& robot, const Posture& posture, const PointsRef& points_W,
-                   std::span<const int> links, std::span<ClosestPair> pairs, std::int64_t steps) {
+                   std::span<const int> links, std::span<ClosestPair> pairs, std::int64_t* steps) {
   std::size_t row = 0;
   for_links(robot, links, [&](int link) {
     ClosestPair& pair = pairs[row++];

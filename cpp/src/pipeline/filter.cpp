@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "geometry/point_chunk.hpp"
 
@@ -91,16 +92,19 @@ void remove_body(const Robot& robot, const Posture& posture, const PointsRef& or
   literal_or_fast(robot, posture, origins_W, points_W, tolerance, min_hit, keep);
 }
 
-void remove_near_surface(const Robot& robot, const Posture& posture, const PointsRef& points_W,
-                         std::span<const double> tolerance, std::span<bool> keep) {
-  std::int64_t steps = kSearchSteps;
+bool remove_near_surface(const Robot& robot, const Posture& posture, const PointsRef& points_W,
+                         std::span<const double> tolerance, std::span<bool> keep,
+                         std::int64_t* steps) {
+  std::int64_t any = std::numeric_limits<std::int64_t>::max();
+  std::int64_t& left = steps != nullptr ? *steps : any;
   const auto touches = [&](std::size_t row, const MeshTree& tree, const Pose& T_WL) {
-    if (steps < 0) return false;
+    if (left < 0) return false;
     const Vector3 point_W = points_W.row(static_cast<Eigen::Index>(row)).transpose();
     const Vector3 point_L = T_WL.linear().transpose() * (point_W - T_WL.translation());
-    return tree.within(point_L, tolerance[row], &steps);
+    return tree.within(point_L, tolerance[row], &left);
   };
   drop_near(robot, posture, points_W, tolerance, keep, touches);
+  return left >= 0;
 }
 
 }  // namespace proxcgal

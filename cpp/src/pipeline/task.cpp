@@ -44,13 +44,6 @@ Vector3 normal_W(const ControlPair& pair) {
   return apart * ((pair.distance < 0.0 ? -1.0 : 1.0) / length);
 }
 
-/// n'J_lin of a pair, (n,).
-JointVector opening_row(const Robot& robot, const Posture& posture, const ControlPair& pair) {
-  Jacobian6 J;
-  robot.jacobian(posture, pair.link, pair.control_W, J);
-  return J.topRows<3>().transpose() * normal_W(pair);
-}
-
 /// d mu / d J of mu = sqrt(det(J J')), and mu. By singular values, because the usual
 /// mu J^+ is 0 / 0 at a singular posture: each one's slope is the product of all the others.
 Jacobian6 slope(const Jacobian6& J, double& mu) {
@@ -88,6 +81,12 @@ Eigen::Index arm_size(const Manipulability& spec, Eigen::Index n) {
 bool positive(double value) { return std::isfinite(value) && value > 0.0; }
 
 }  // namespace
+
+JointVector opening_row(const Robot& robot, const Posture& posture, const ControlPair& pair) {
+  Jacobian6 J;
+  robot.jacobian(posture, pair.link, pair.control_W, J);
+  return J.topRows<3>().transpose() * normal_W(pair);
+}
 
 double decreasing(double x, double a, double b) {
   if (x <= a) return 1.0;

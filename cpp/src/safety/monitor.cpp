@@ -13,21 +13,36 @@ void MonitorConfig::validate() const {
   require(degraded_scale >= 0.0 && degraded_scale <= 1.0, "monitor.degraded_scale", degraded_scale,
           "0 to 1");
   require(clean_cycles >= 1, "monitor.clean_cycles", clean_cycles, "1 or more");
+  require(suspect_repeats >= 0, "monitor.suspect_repeats", suspect_repeats, "0 or more");
+  require(fresh_within > 0.0, "monitor.fresh_within", fresh_within, "above 0 s");
+  require(approach_speed >= 0.0, "monitor.approach_speed", approach_speed, "0 m/s or more");
+  require(blind_speed >= 0.0, "monitor.blind_speed", blind_speed, "0 m/s or more");
+  require(joints_hold_after > 0.0, "monitor.joints_hold_after", joints_hold_after, "above 0 s");
+  require(joints_stop_after >= joints_hold_after, "monitor.joints_stop_after", joints_stop_after,
+          "joints_hold_after or more [s]");
+  require(stuck_after > 0.0, "monitor.stuck_after", stuck_after, "above 0 s");
   require(missed_deadlines >= 1, "monitor.missed_deadlines", missed_deadlines, "1 or more");
 }
 
 Mode mode_of(Reason reason) {
   switch (reason) {
     case Reason::kJointStateInvalid:
+    case Reason::kJointStateLost:
       return Mode::kStop;
     case Reason::kAllSensorsSilent:
+    case Reason::kArraySilent:
+    case Reason::kBlindMotion:
+    case Reason::kJointStateStale:
+    case Reason::kAvoidanceStuck:
     case Reason::kNoControllableLink:
     case Reason::kGoalInvalid:
     case Reason::kDeadlinesMissed:
       return Mode::kHold;
     case Reason::kSensorSilent:
+    case Reason::kSensorSuspect:
+    case Reason::kContact:
     case Reason::kPointsInvalid:
-    case Reason::kDistanceBounded:
+    case Reason::kWorkBounded:
       return Mode::kDegraded;
     case Reason::kScanRefused:
     case Reason::kZoneInvalid:
@@ -48,6 +63,20 @@ const char* reason_name(Reason reason) {
       return "sensor_silent";
     case Reason::kAllSensorsSilent:
       return "all_sensors_silent";
+    case Reason::kArraySilent:
+      return "array_silent";
+    case Reason::kSensorSuspect:
+      return "sensor_suspect";
+    case Reason::kBlindMotion:
+      return "blind_motion";
+    case Reason::kJointStateStale:
+      return "joint_state_stale";
+    case Reason::kJointStateLost:
+      return "joint_state_lost";
+    case Reason::kAvoidanceStuck:
+      return "avoidance_stuck";
+    case Reason::kContact:
+      return "contact";
     case Reason::kScanRefused:
       return "scan_refused";
     case Reason::kZoneInvalid:
@@ -72,8 +101,8 @@ const char* reason_name(Reason reason) {
       return "deadline_missed";
     case Reason::kDeadlinesMissed:
       return "deadlines_missed";
-    case Reason::kDistanceBounded:
-      return "distance_bounded";
+    case Reason::kWorkBounded:
+      return "work_bounded";
     case Reason::kPointsInvalid:
       return "points_invalid";
   }
@@ -85,10 +114,16 @@ Monitor::Monitor(const MonitorConfig& config) : config_(config) { config.validat
 void Monitor::begin() {
   count_ = 0;
   wanted_ = Mode::kRun;
+  slows_ = false;
 }
 
 void Monitor::add(const Finding& finding) {
-  wanted_ = std::max(wanted_, mode_of(finding.reason));
+  const Mode calls_for = mode_of(finding.reason);
+  wanted_ = std::max(wanted_, calls_for);
+  // What a single sensor covered is slowed by direction instead: perception tells where.
+  const bool local =
+      finding.reason == Reason::kSensorSilent || finding.reason == Reason::kSensorSuspect;
+  if (calls_for >= Mode::kDegraded && !local) slows_ = true;
   // Past the room there is, the mode still counts the finding; only its details are lost.
   if (count_ < kMaxFindings) findings_[static_cast<std::size_t>(count_++)] = finding;
 }
@@ -104,6 +139,7 @@ void Monitor::deadline(bool late) {
 }
 
 Mode Monitor::conclude() {
+  slowed_for_ = slows_ ? config_.clean_cycles : std::max(slowed_for_ - 1, 0);
   if (mode_ == Mode::kStop) return mode_;
   clean_ = wanted_ < mode_ ? clean_ + 1 : 0;
   if (wanted_ > mode_ || clean_ >= config_.clean_cycles) {

@@ -7,10 +7,13 @@ namespace proxcgal {
 
 /// What a caller knows and wants of a search.
 struct SearchOptions {
-  std::span<const int> links;         ///< rows to look at; empty means all
-  ClosestPair before;                 ///< of a moment ago, where there is one: `fast` begins there
-  double within = kInfinity;          ///< [m] only a nearer pair counts
-  std::int64_t steps = kSearchSteps;  ///< for `fast`; past them the answer is a lower bound
+  std::span<const int> links;  ///< rows to look at; empty means all
+  ClosestPair before;          ///< of a moment ago, where there is one: `fast` begins there
+  double within = kInfinity;   ///< [m] only a nearer pair counts
+  /// Tree nodes and leaves that `fast` may still look at, counted down where given: searches that
+  /// share it share its work. Once spent, the answer is a lower bound, tight where rows of the
+  /// cloud that stand together lie together.
+  std::int64_t* steps = nullptr;
 };
 
 /// Algorithm 2 of [WA]: the nearest (cloud point, surface point) over the links asked for.
@@ -22,6 +25,6 @@ ClosestPair closest_pair(const Robot& robot, const Posture& posture, const Point
 /// @param[in,out] pairs  one per link: where each search begins, where found; the answer
 void closest_pairs(const Robot& robot, const Posture& posture, const PointsRef& points_W,
                    std::span<const int> links, std::span<ClosestPair> pairs,
-                   std::int64_t steps = kSearchSteps);
+                   std::int64_t* steps = nullptr);
 
 }  // namespace proxcgal

@@ -23,8 +23,12 @@ void remove_body(const Robot& robot, const Posture& posture, const PointsRef& or
 /// 1 alone lets noisy self-hits through (docs/sources.md).
 ///
 /// Every point that Algorithm 1 drops is dropped here too: the hit that explains it is within its
-/// tolerance. Work is bounded; a point that it does not suffice for is kept, as an obstacle.
-void remove_near_surface(const Robot& robot, const Posture& posture, const PointsRef& points_W,
-                         std::span<const double> tolerance, std::span<bool> keep);
+/// tolerance.
+/// @param steps  tree nodes and leaves that may be looked at, counted down where given; points that
+///               they do not suffice for are kept
+/// @return       did they suffice?
+bool remove_near_surface(const Robot& robot, const Posture& posture, const PointsRef& points_W,
+                         std::span<const double> tolerance, std::span<bool> keep,
+                         std::int64_t* steps = nullptr);
 
 }  // namespace proxcgal

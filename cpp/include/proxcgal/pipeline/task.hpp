@@ -112,7 +112,9 @@ void build_manipulability(const Manipulability& spec, const Robot& robot, const 
                           BuiltTask& out);
 /// @}
 
-/// The norm of the avoidance row n'J of a pair: how well joints can open it.
+/// n'J_lin of a pair, (n,): the rate at which its distance opens, by the joints' velocities.
+JointVector opening_row(const Robot& robot, const Posture& posture, const ControlPair& pair);
+/// Its norm: how well joints can open it.
 double row_norm(const Robot& robot, const Posture& posture, const ControlPair& pair);
 
 /// Angle-axis vector that turns `from` into `to`, in world [rad]: at most pi long. At a half turn
