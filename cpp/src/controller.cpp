@@ -17,6 +17,7 @@ constexpr double kExecuted = 0.5;     // share of the demanded rate that counts 
 constexpr double kEngaged = 0.5;      // activation from which avoidance must be executed
 constexpr double kRigid = 1e-6;       // how far a goal's rotation may be from orthonormal
 constexpr double kFarthest = 1e9;     // [m] squares stay far inside single precision
+constexpr double kBelieved = 0.1;     // [s] inside d_min: longer than one scan lasts
 constexpr double kInto = 0.02;        // [m/s] slower motion into the unseen holds nothing up
 
 /// Middle and corners of a sensor's field of view, in its frame.
@@ -53,6 +54,7 @@ struct Controller::Impl {
   std::array<Vector3, 5> view_S;
   std::optional<Avoidance> avoidance;   // the first of the stack
   double stuck_since = -1.0;            // [s] internal, negative while avoidance is executed
+  double near_since = 0.0;              // [s] internal, since when a pair has been inside d_min
   Vector3 outward_W = Vector3::Zero();  // last normal of a pair that was surely outside
   std::array<TickRecord, kKeptTicks> kept;
   std::size_t n_kept = 0;  // ever
@@ -194,10 +196,12 @@ struct Controller::Impl {
     if (apart.dot(outward_W) < 0.0) out.trusted_distance = -out.pair->distance;
   }
 
-  /// Which zone must not lose its obstacle to the body filter.
+  /// Which zone must not lose its obstacle to the body filter. What was seen in one scan only may
+  /// be noise on the body itself.
   void watch() {
     const bool near = avoidance && out.pair && out.trusted_distance < avoidance->d_min;
-    if (near) {
+    if (!near) near_since = clock;
+    if (near && clock - near_since > kBelieved) {
       perception.watch({out.pair_origin, out.pair->obstacle_W});
     } else {
       perception.watch({});
@@ -290,7 +294,9 @@ struct Controller::Impl {
         if (engaged && missing[row] > kExecuted * task.rate[row]) {
           note(Reason::kNotExecuted, out.control.link);
           // Outside d_min the goal may well hold against it: there the arm may come to rest.
-          const bool inside = out.trusted_distance < avoidance->d_min;
+          // The baseline moves another point than the pair's, and is left as it is published.
+          const bool inside = config.control_point == ControlPoint::kWholeBody &&
+                              out.trusted_distance < avoidance->d_min;
           if (!inside) {
             stuck_since = -1.0;
           } else if (stuck_since < 0.0) {

@@ -52,13 +52,13 @@ class Solver(Section):
 
 
 class Monitor(Section):
-    """Freshness bounds."""
+    """Bounds of the monitor."""
 
     degraded_after: Positive = like(
         "MonitorConfig", "degraded_after", "[s] age of one sensor's scan that slows the arm"
     )
     hold_after: Positive = like(
-        "MonitorConfig", "hold_after", "[s] age of all sensors' scans that holds the arm"
+        "MonitorConfig", "hold_after", "[s] age of an array's scans that holds the arm"
     )
     degraded_scale: Share = like(
         "MonitorConfig", "degraded_scale", "of the speed limits while degraded"
@@ -68,6 +68,34 @@ class Monitor(Section):
     )
     missed_deadlines: Count = like(
         "MonitorConfig", "missed_deadlines", "in a row, before the arm holds"
+    )
+    suspect_repeats: int = like(
+        "MonitorConfig",
+        "suspect_repeats",
+        "equal payloads in a row that make a sensor suspect; 0 for never (sensors without noise)",
+        ge=0,
+    )
+    fresh_within: Positive = like(
+        "MonitorConfig", "fresh_within", "[s] a scan of this age is trusted as it is"
+    )
+    approach_speed: NonNegative = like(
+        "MonitorConfig",
+        "approach_speed",
+        "[m/s] assumed of what moves in: past `fresh_within` it shortens the trusted distance",
+    )
+    blind_speed: NonNegative = like(
+        "MonitorConfig",
+        "blind_speed",
+        "[m/s] at most into what a silent sensor covered; 0 at `hold_after`",
+    )
+    joints_hold_after: Positive = like(
+        "MonitorConfig", "joints_hold_after", "[s] age of the joint state that holds the arm"
+    )
+    joints_stop_after: Positive = like(
+        "MonitorConfig", "joints_stop_after", "[s] age of the joint state that stops it"
+    )
+    stuck_after: Positive = like(
+        "MonitorConfig", "stuck_after", "[s] of avoidance not executed inside d_min, before HOLD"
     )
 
 
