@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 
 import proxcgal as px
-from proxcgal.study.pool import Pool, StoppedError, default_workers
+from proxcgal.study.jobs import StoppedError
+from proxcgal.study.pool import Pool, default_workers
 
 JOBS = """
 import os, signal, time

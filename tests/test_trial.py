@@ -100,6 +100,19 @@ def test_summary_is_what_the_arrays_say(runs: Runs) -> None:
     assert summary["self_min_m"] == log.self_m.min()
 
 
+def test_sparse_truth_gives_the_same_summary(ur10e: px.Robot) -> None:
+    scenario = load_scenario("front_plane", ["duration=3.0", "obstacle.0.position.0=0.45"])
+    every, sparse = (
+        run_trial(scenario, "sm", robot=ur10e, sparse_truth=sparse) for sparse in (False, True)
+    )
+    assert np.isnan(sparse.true_m).any()
+    assert sparse.q.tobytes() == every.q.tobytes()
+    told = sparse.summary()
+    assert told["violations"] > 0
+    for key, value in every.summary().items():
+        assert key == "wall_s" or told[key] == value
+
+
 def test_distance_to_nothing_is_reported_as_9_99(ur10e: px.Robot) -> None:
     scenario = load_scenario("front_plane", ["duration=0.2", "obstacle=[]"])
     summary = run_trial(scenario, "wb_known", robot=ur10e).summary()

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 import proxcgal as px
 from proxcgal.sim import boxes
+from proxcgal.sim.decisive import decisive_truth
 from proxcgal.sim.ranges import NO_TARGET, VALID, RangeModel
 from proxcgal.sim.scenario import load_scenario
 from proxcgal.sim.scenario_keys import Obstacle, Sensor, Simulation
@@ -57,9 +58,8 @@ def test_rays_hit_where_our_own_trees_say(ur10e: px.Robot, world: World) -> None
     world.place(Q)
     trees = [px.MeshTree(*surface) for surface in surfaces_in_world(ur10e, Q)]
     origins, directions = rays(2000)
-    hits = [world.cast(o, d[None]) for o, d in zip(origins, directions, strict=True)]
-    lengths = np.array([hit.length[0] for hit in hits])
-    own = np.array([hit.robot[0] for hit in hits])
+    hits = world.cast(origins, directions[:, None])
+    lengths, own = hits.length[:, 0], hits.robot[:, 0]
     each = np.array([tree.first_hit(origins, directions) for tree in trees])
     expected = each.min(axis=0)
     found = np.isfinite(expected)
@@ -69,13 +69,29 @@ def test_rays_hit_where_our_own_trees_say(ur10e: px.Robot, world: World) -> None
     np.testing.assert_array_equal(own[found], each.argmin(axis=0)[found] < len(trees) - 1)
 
 
+def test_a_robots_second_world_has_its_own_obstacles(ur10e: px.Robot, world: World) -> None:
+    """MuJoCo's model of a robot is compiled once; boxes are put into copies of it."""
+    moved = Obstacle(size=(0.4, 0.03, 0.7), position=(0.5, -0.4, 0.9), rpy=(0.5, -0.2, 1.0))
+    second = World(ur10e, [moved])
+    origins, directions = rays(1500, seed=6)
+    for each, box in ((world, PANEL), (second, moved)):
+        each.place(Q)
+        hits = each.cast(origins, directions[:, None])
+        tree = px.MeshTree(*boxes.surface(box.size, box.pose()))
+        alone = tree.first_hit(origins, directions)
+        on_box = np.isfinite(hits.length[:, 0]) & ~hits.robot[:, 0]
+        assert on_box.sum() > 20
+        np.testing.assert_allclose(hits.length[on_box, 0], alone[on_box], atol=1e-9)
+        assert (hits.length[:, 0] <= alone + 1e-9).all()
+
+
 def test_rays_hit_where_trimesh_says(ur10e: px.Robot, world: World) -> None:
     world.place(Q)
     parts = [trimesh.Trimesh(*surface, process=False) for surface in surfaces_in_world(ur10e, Q)]
     corners = trimesh.util.concatenate(parts).triangles
     origins, directions = rays(60, seed=1)
     for origin, direction in zip(origins, directions, strict=True):
-        length = world.cast(origin, direction[None]).length[0]
+        length = world.cast(origin[None], direction[None, None]).length[0, 0]
         expected = first_hit_by_plane_equations(corners, origin, direction)
         assert length == expected or abs(length - expected) < 1e-6
 
@@ -95,9 +111,9 @@ def test_many_rays_at_once_give_what_single_rays_give(world: World) -> None:
     world.place(Q)
     _, directions = rays(300, seed=2)
     origin = np.array([0.5, 0.3, 0.9])
-    together = world.cast(origin, directions)
-    single = [world.cast(origin, direction[None]).length[0] for direction in directions]
-    np.testing.assert_array_equal(together.length, single)
+    together = world.cast(origin[None], directions[None]).length[0]
+    single = world.cast(np.tile(origin, (300, 1)), directions[:, None]).length[:, 0]
+    np.testing.assert_array_equal(together, single)
 
 
 def test_a_ray_goes_on_behind_its_own_mounting(world: World) -> None:
@@ -105,8 +121,9 @@ def test_a_ray_goes_on_behind_its_own_mounting(world: World) -> None:
     near = np.array([0.9, 0.1, 0.6]) - 0.5 * 0.02 * PANEL.pose()[:3, 0]
     out = -PANEL.pose()[:3, 0]
     inside = near - 0.003 * out
-    assert world.cast(inside, out[None]).length[0] == pytest.approx(0.003, abs=1e-9)
-    assert world.cast(inside, out[None], start=0.005).length[0] > 0.1
+    bundle = inside[None], out[None, None]
+    assert world.cast(*bundle).length[0, 0] == pytest.approx(0.003, abs=1e-9)
+    assert world.cast(*bundle, start=0.005).length[0, 0] > 0.1
 
 
 def test_an_arm_without_finite_pose_is_an_error(world: World) -> None:
@@ -234,9 +251,9 @@ def test_scans_are_taken_where_the_arm_was_at_their_stamp(ur10e: px.Robot) -> No
         mount = setup.skin.mounts[scan.sensor]
         pose = ur10e.link_poses(q)[list(ur10e.link_names).index(mount.link)] @ mount.T_LS
         directions = RangeModel(Simulation(), SENSOR, 1, 0).rays_S
-        hits = still.cast(pose[:3, 3], directions @ pose[:3, :3].T, 0.005)
+        hits = still.cast(pose[None, :3, 3], (directions @ pose[:3, :3].T)[None], 0.005)
         seen = np.asarray(scan.status) == VALID
-        expected = hits.length * directions[:, 2]
+        expected = hits.length[0] * directions[:, 2]
         np.testing.assert_allclose(np.asarray(scan.ranges)[seen], expected[seen], atol=0.000501)
 
 
@@ -287,6 +304,30 @@ def test_own_distance_reaches_its_least_exactly(ur10e: px.Robot) -> None:
     path = [Q + np.array([0.0, 0.0, 0.02 * k, 0.0, 0.0, 0.0]) for k in range(25)]
     least = min(truth(q)[2] for q in path)
     assert least == pytest.approx(min(Truth(ur10e, [])(q)[2] for q in path[::4] + path[-1:]))
+
+
+def test_truth_where_it_decides_is_the_truth_of_every_tick(ur10e: px.Robot) -> None:
+    """What the bounds leave out is no new least, no violation and not wanted."""
+    panel = PANEL.model_copy(update={"position": (0.78, 0.1, 0.6)})
+    qd = np.array([0.3, 0.4, -0.5, 0.2, 0.3, 0.1])
+    q = np.array([Q + 0.4 * np.sin(0.05 * k) * qd for k in range(120)])
+    wanted = np.arange(len(q)) >= 100
+    truth = Truth(ur10e, [panel])
+    every = [truth(posture) for posture in q]
+    distance = np.array([tick[0] for tick in every])
+    under = float(np.quantile(distance, 0.2))
+    found = decisive_truth(ur10e, [panel], q, wanted, under)
+    asked = ~np.isnan(found.distance)
+    assert asked[wanted].all()
+    assert asked[distance < under].all()
+    assert asked.sum() < 90
+    np.testing.assert_array_equal(found.distance[asked], distance[asked])
+    assert [found.link[k] for k in np.flatnonzero(asked)] == [
+        every[k][1] for k in np.flatnonzero(asked)
+    ]
+    assert np.nanmin(found.distance) == distance.min()
+    assert np.nanmin(found.own) == min(tick[2] for tick in every)
+    assert np.isnan(found.own).any()
 
 
 def test_neighbours_and_links_built_close_together_do_not_count(ur10e: px.Robot) -> None:

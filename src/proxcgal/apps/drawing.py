@@ -15,7 +15,7 @@ from proxcgal.study.analysis import write_bytes
 if TYPE_CHECKING:
     from proxcgal.sim.scenario import Scenario
     from proxcgal.sim.trial import TrialLog
-    from proxcgal.study.pool import Report
+    from proxcgal.study.jobs import Report
 
 DRAWN_SPACING_M = 0.03  # [m] between the obstacle's points in a figure
 MOVING = ("wb", "sm")  # whose recordings the moving picture shows, side by side

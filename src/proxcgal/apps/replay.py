@@ -98,6 +98,7 @@ def _print_header(recording: Recording) -> None:
     print(
         f"{settings.scenario.name}, {settings.controller}, seed {settings.seed}: "
         f"{len(recording.ticks)} ticks, {recording.ticks[-1].given.time:.2f} s"
+        + ("" if settings.ticks == "all" else "; those with scans only, and so are the numbers")
     )
 
 

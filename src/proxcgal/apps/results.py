@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proxcgal.apps.progress import Progress, announce
-from proxcgal.errors import ConfigError, ModelWarning
+from proxcgal.errors import ConfigError
 from proxcgal.study.analysis import Summary, combined, static_summary, write_json, write_text
-from proxcgal.study.pool import Pool, Report, default_workers
+from proxcgal.study.pool import Pool, default_workers
 
 if TYPE_CHECKING:
     from proxcgal.sim.scenario import Scenario
@@ -155,8 +155,16 @@ def ready(folders: Sequence[Path]) -> list[Path]:
 
 
 def _simulate(pool: Pool, trials: Sequence[tuple[Plan, str]], quiet: bool) -> list[TrialLog]:
+    from proxcgal.study.trials import simulate
+
     jobs = [
-        functools.partial(_trial, plan.scenario, name, plan.folder / f"{name}.mcap")
+        functools.partial(
+            simulate,
+            plan.scenario,
+            name,
+            plan.scenario.seed,
+            recording=plan.folder / f"{name}.mcap",
+        )
         for plan, name in trials
     ]
     seconds = [plan.scenario.duration for plan, _ in trials]
@@ -174,19 +182,6 @@ def _simulate(pool: Pool, trials: Sequence[tuple[Plan, str]], quiet: bool) -> li
         if log.recording_failure:
             warnings.warn(log.recording_failure, RuntimeWarning, stacklevel=2)
     return logs
-
-
-def _trial(scenario: Scenario, controller: str, recording: Path, report: Report) -> TrialLog:
-    """One trial, in whichever process."""
-    from proxcgal.sim.recorder import Recorder
-    from proxcgal.sim.trial import run_trial
-
-    with warnings.catch_warnings(), Recorder(recording) as recorder:
-        # What there is to say of a model was said when the set-up was checked, and a recording
-        # that stops early is in the log.
-        warnings.simplefilter("ignore", ModelWarning)
-        warnings.simplefilter("ignore", RuntimeWarning)
-        return run_trial(scenario, controller, recorder=recorder, on_progress=report)
 
 
 def _draw(

@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
-from typing import IO, BinaryIO, Self, cast
+from typing import IO, BinaryIO, Literal, Self, cast
 
 import numpy as np
 from mcap.writer import CompressionType, IndexType, Writer
@@ -28,6 +28,9 @@ from proxcgal.sim.scenario import Scenario
 from proxcgal.sim.ticks import Tick
 
 Array = NDArray[np.float64]
+
+#: Every tick, which a replay repeats bit for bit; or, to step through, those that brought scans.
+RecordedTicks = Literal["all", "scans"]
 
 PROFILE = "proxcgal"
 FORMAT = "1"
@@ -49,18 +52,24 @@ class Settings:
     meshes: Mapping[str, str]  #: SHA-256 of each link's two meshes
     versions: Mapping[str, str] = field(default_factory=lambda: versions())
     known_points_W: Array | None = field(default=None, compare=False)  #: where the run uses them
+    ticks: RecordedTicks = "all"
 
 
 class Recorder:
     """Writes one run. A full disk stops the recording, with a warning, but never the run."""
 
-    def __init__(self, path: str | Path) -> None:
+    def __init__(self, path: str | Path, ticks: RecordedTicks = "all") -> None:
         """Opens the file at once, so that a bad place is told before anything is computed.
+
+        Args:
+            path: of the file.
+            ticks: which of them whoever runs the trial is to write.
 
         Raises:
             ConfigError: the folder cannot be made or the file not be written.
         """
         self.path = Path(path)
+        self.ticks: RecordedTicks = ticks
         self.failure: str | None = None  #: why it stopped early
         self.started = False
         try:
@@ -149,6 +158,7 @@ class Recorder:
             "seed": str(settings.seed),
             "meshes": json.dumps(dict(settings.meshes)),
             "versions": json.dumps(dict(settings.versions)),
+            "ticks": settings.ticks,
         }
         self._writer.add_metadata(SETTINGS, {**content, "crc": settings_crc(content)})
         if settings.known_points_W is not None:

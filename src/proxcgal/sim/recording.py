@@ -105,6 +105,7 @@ class _Contents:
                 meshes=json.loads(content["meshes"]),
                 versions=json.loads(content["versions"]),
                 known_points_W=self._known_points,
+                ticks="scans" if content.get("ticks") == "scans" else "all",
             )
         except (ConfigError, KeyError, ValueError) as error:
             raise RecordingError(f"recording {self._path}: unusable settings: {error}") from None

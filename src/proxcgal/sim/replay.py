@@ -35,9 +35,15 @@ class Replay:
             overrides: `key.sub=value` on the recorded scenario.
 
         Raises:
-            ConfigError: a bad override, or scans are needed and none were recorded.
+            ConfigError: a bad override, scans are needed and none were recorded, or not every
+                tick was.
         """
         settings = recording.settings
+        if settings.ticks != "all":
+            raise ConfigError(
+                f"recording {recording.path}: holds the ticks that brought scans, to step through; "
+                "commands can be computed again from every tick only"
+            )
         scenario = change_scenario(settings.scenario, str(recording.path), overrides)
         self.recording = recording
         self.controller = controller or settings.controller

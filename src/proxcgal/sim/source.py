@@ -67,8 +67,9 @@ class SimulatedSource:
         self._phase: Array = turns / settings.sensor_hz
         self._scans = np.zeros(sensors, np.int64)
         links = list(setup.robot.link_names)
-        self._links = [links.index(mount.link) for mount in setup.skin.mounts]
-        self._T_LS = [np.array(mount.T_LS) for mount in setup.skin.mounts]
+        mounts = setup.skin.mounts
+        self._links = np.array([links.index(mount.link) for mount in mounts], np.intp)
+        self._T_LS = np.array([mount.T_LS for mount in mounts]).reshape(-1, 4, 4)
         #: (sensors, 64) true where the last scan really saw the robot itself.
         self.saw_robot: NDArray[np.bool_] = np.zeros((sensors, ZONES), bool)
 
@@ -99,16 +100,12 @@ class SimulatedSource:
         """Scans of the sensors that measure together; they share one index."""
         assert self._world is not None
         self._world.place(q)
-        poses_W = self._setup.robot.link_poses(q)
-        rays = self._ranges.rays_S
-        lengths, own = np.empty((len(rows), len(rays))), np.empty((len(rows), len(rays)), bool)
-        for at, row in enumerate(rows):
-            T_WS = poses_W[self._links[row]] @ self._T_LS[row]
-            hits = self._world.cast(T_WS[:3, 3], rays @ T_WS[:3, :3].T, self._mounting)
-            lengths[at], own[at] = hits.length, hits.robot
+        T_WS = self._setup.robot.link_poses(q)[self._links[rows]] @ self._T_LS[rows]
+        directions_W = self._ranges.rays_S @ np.swapaxes(T_WS[:, :3, :3], 1, 2)
+        hits = self._world.cast(T_WS[:, :3, 3], directions_W, self._mounting)
         index = int(self._scans[rows[0]])
-        ranges, status = self._ranges.measure(rows, index, lengths)
-        self.saw_robot[rows] = self._ranges.pick(lengths, own)
+        ranges, status = self._ranges.measure(rows, index, hits.length)
+        self.saw_robot[rows] = self._ranges.pick(hits.length, hits.robot)
         self._scans[rows] += 1
         return [
             _core.Scan(row, index, stamp, ranges[at], status[at]) for at, row in enumerate(rows)

@@ -74,12 +74,14 @@ class Surfaces:
 
     def motion(self, links: NDArray[np.intp], before: Array, after: Array) -> Array:
         """(k,) no point of these links (k,) moved farther between two poses (k, 4, 4) [m]."""
-        turned = after[:, :3, :3] - before[:, :3, :3]
-        shifted = np.einsum("nij,nj->ni", turned, self._centers[links])
-        shifted += after[:, :3, 3] - before[:, :3, 3]
+        return moved(self.sweep(links, before), self.sweep(links, after))
+
+    def sweep(self, links: NDArray[np.intp], poses: Array) -> Array:
+        """(k, 12) of links (k,) at poses (k, 4, 4), for `moved` [m]: centre, turned radius."""
+        radii, R = self._radii[links, None, None], poses[:, :3, :3]
+        centers = np.einsum("nij,nj->ni", R, self._centers[links]) + poses[:, :3, 3]
         # A difference of rotations has two equal singular values and a zero.
-        swept: Array = self._radii[links] * np.linalg.norm(turned, axis=(1, 2)) / np.sqrt(2.0)
-        return np.asarray(np.linalg.norm(shifted, axis=1) + swept)
+        return np.hstack([centers, (R * radii / np.sqrt(2.0)).reshape(-1, 9)])
 
     @staticmethod
     def _joints_between(moves: NDArray[np.bool_], a: int, b: int) -> int:
@@ -101,6 +103,14 @@ class Surfaces:
             order = np.linalg.norm(self._vertices[b] - near_B, axis=1).argsort()
             probes_B = np.concatenate([self._vertices[b][order[:_PROBES]], probes_B])[:2000]
         return True
+
+
+def moved(before: Array, after: Array) -> Array:
+    """(k,) no point of a link moved farther between two rows of `Surfaces.sweep` (k, 12) [m]."""
+    step = after - before
+    centers, turns = step[:, :3], step[:, 3:]
+    shifted = np.sqrt(np.einsum("ni,ni->n", centers, centers))
+    return np.asarray(shifted + np.sqrt(np.einsum("ni,ni->n", turns, turns)))
 
 
 def inverse(T: Array) -> Array:

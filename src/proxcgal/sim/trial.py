@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from proxcgal import _core
 from proxcgal.models import Robot
+from proxcgal.sim.decisive import decisive_truth
 from proxcgal.sim.faults import FaultInjector
 from proxcgal.sim.loop import run_ticks
 from proxcgal.sim.recorder import Recorder, Settings
@@ -17,7 +19,7 @@ from proxcgal.sim.scenario import CONTROLLERS, Scenario
 from proxcgal.sim.setup import Setup
 from proxcgal.sim.source import SimulatedSource
 from proxcgal.sim.ticks import Tick, TickTruth
-from proxcgal.sim.trial_log import TrialLog
+from proxcgal.sim.trial_log import TOO_CLOSE, TrialLog, final_ticks
 from proxcgal.sim.truth import Truth
 from proxcgal.sim.world import World
 
@@ -34,6 +36,7 @@ def run_trial(
     robot: Robot | None = None,
     recorder: Recorder | None = None,
     on_progress: Progress | None = None,
+    sparse_truth: bool = False,
 ) -> TrialLog:
     """Simulates a scenario with one controller.
 
@@ -44,6 +47,8 @@ def run_trial(
         robot: the scenario's, where it is loaded already.
         recorder: gets every tick; the caller closes it.
         on_progress: told the share that is done, 0 to 1, once each tenth of a simulated second.
+        sparse_truth: true distances only where they can change a number of the summary, which
+            stays exact; nan elsewhere. A recording has them at every tick.
 
     Raises:
         ConfigError: what of the scenario does not fit.
@@ -57,20 +62,21 @@ def run_trial(
     faults = FaultInjector(scenario.faults, [mount.name for mount in setup.skin.mounts], seed)
     world = World(setup.robot, scenario.obstacles) if known is None else None
     source = SimulatedSource(setup, world, seed)
-    truth = Truth(setup.robot, scenario.obstacles)
+    truth = None if sparse_truth and recorder is None else Truth(setup.robot, scenario.obstacles)
     log = None
     if recorder is not None:
         recorder.start(
             Settings(
                 scenario=scenario.model_copy(update={"seed": seed}), controller=controller,
                 seed=seed, meshes=setup.mesh_hashes(), known_points_W=known,
+                ticks=recorder.ticks,
             )
         )  # fmt: skip
-        log = _Log(recorder, setup.robot, 1.0 / scenario.simulation.sensor_hz)
+        log = _Log(recorder, setup.robot, scenario.simulation.sensor_hz)
     ticks: list[Tick] = []
     beat = max(round(0.1 * scenario.simulation.control_hz), 1)
     for given, result in run_ticks(source, law, faults, known):
-        distance, link, own = truth(given.q)
+        distance, link, own = (np.nan, "", np.nan) if truth is None else truth(given.q)
         leaked = 0 if known is not None else _leaked(law, source)
         ticks.append(Tick(given, result, TickTruth(distance, link, own, leaked)))
         if log is not None:
@@ -79,11 +85,28 @@ def run_trial(
             on_progress(min((given.time + law.config.period) / scenario.duration, 1.0))
     if on_progress is not None:
         on_progress(1.0)
+    if truth is None:
+        ticks = _with_truth(ticks, setup)
     return TrialLog.of(
         ticks, setup.robot, scenario=scenario.name, controller=controller, seed=seed,
         wall_s=clock.perf_counter() - begin,
         recording_failure=recorder.failure if recorder else None,
     )  # fmt: skip
+
+
+def _with_truth(ticks: Sequence[Tick], setup: Setup) -> list[Tick]:
+    """The ticks with the true distances that the summary needs."""
+    time = np.array([tick.given.time for tick in ticks])
+    q = np.array([tick.given.q for tick in ticks])
+    asked = decisive_truth(
+        setup.robot, setup.scenario.obstacles, q, final_ticks(time), under=TOO_CLOSE
+    )
+    return [
+        replace(tick, truth=TickTruth(float(distance), link, float(own), tick.truth.leaked))
+        for tick, distance, link, own in zip(
+            ticks, asked.distance, asked.link, asked.own, strict=True
+        )
+    ]
 
 
 def _leaked(law: _core.Controller, source: SimulatedSource) -> int:
@@ -95,17 +118,20 @@ def _leaked(law: _core.Controller, source: SimulatedSource) -> int:
 class _Log:
     """What the recorder is told: every tick, and at the sensors' rate what Foxglove draws."""
 
-    def __init__(self, recorder: Recorder, robot: Robot, period: float) -> None:
+    def __init__(self, recorder: Recorder, robot: Robot, hz: float) -> None:
         self._recorder = recorder
         self._robot = robot
-        self._period = period
-        self._next = -np.inf
+        self._hz = hz
+        self._beats = -1
 
     def write(self, tick: Tick, law: _core.Controller) -> None:
-        if tick.given.time >= self._next:
-            self._next = tick.given.time + 0.999 * self._period
+        beats = int(np.floor(tick.given.time * self._hz + 1e-9))  # those of the scans
+        beat = beats > self._beats
+        if beat:
+            self._beats = beats
             arrow = (tick.result.control_W, tick.result.obstacle_W)
             poses = np.asarray(self._robot.link_poses(tick.given.q))
             names = self._robot.link_names
             self._recorder.show(tick.given.time, law.cloud_W(), names, poses, arrow)
-        self._recorder.write(tick)
+        if beat or tick.given.scans or self._recorder.ticks == "all":
+            self._recorder.write(tick)

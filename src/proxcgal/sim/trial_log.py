@@ -32,9 +32,9 @@ class TrialLog:
     q: Array  #: (n, n_q)
     qd: Array  #: (n, n_q) commanded
     seen_m: Array  #: (n,) cloud to robot, inf where nothing is seen
-    true_m: Array  #: (n,) scene to robot, inf where there is no scene
-    true_link: list[str]  #: the link that is nearest to the scene
-    self_m: Array  #: (n,) between the robot's own links
+    true_m: Array  #: (n,) scene to robot, inf where there is no scene, nan where not asked
+    true_link: list[str]  #: the link that is nearest to the scene, "" where not asked
+    self_m: Array  #: (n,) between the robot's own links, nan where not asked
     activation: Array  #: (n,) of avoidance
     control_link: list[str]  #: the link that avoidance moves, "" for none
     pair_surface_W: Array  #: (n, 3) the point that avoidance moves, nan for none
@@ -100,11 +100,10 @@ class TrialLog:
 
     def summary(self) -> dict[str, float | int]:
         """The run's numbers, as experiments report them; distances in metres."""
-        final = self.time >= self.time[-1] - FINAL if len(self.time) else self.time > 0.0
-        distance = np.minimum(self.true_m, NOTHING)
+        ends = np.minimum(self.true_m, NOTHING)[final_ticks(self.time)]
         return {
             "true_min_m": _least(self.true_m),
-            "true_final_m": min(float(distance[final].mean()), NOTHING) if final.any() else NOTHING,
+            "true_final_m": min(float(ends.mean()), NOTHING) if len(ends) else NOTHING,
             "seen_min_m": _least(self.seen_m),
             "goal_error_m": float(self.goal_error_m[-1]) if len(self.time) else 0.0,
             "violations": int((self.true_m < TOO_CLOSE).sum()),
@@ -114,8 +113,14 @@ class TrialLog:
         }
 
 
+def final_ticks(time: Array) -> NDArray[np.bool_]:
+    """(n,) true for the ticks that `true_final_m` is the mean of."""
+    return time >= time[-1:] - FINAL if len(time) else np.zeros(0, bool)
+
+
 def _least(distances: Array) -> float:
-    return float(min(distances.min(initial=np.inf), NOTHING))
+    """Of those that were asked; nan where none was."""
+    return float(min(np.fmin.reduce(distances, initial=np.inf), NOTHING))
 
 
 def _points(points: Sequence[Sequence[float] | None]) -> Array:

@@ -6,12 +6,14 @@ exactly, so a pose is set, and rays and pictures are taken at it.
 
 from __future__ import annotations
 
+import copy
 import ctypes
 import os
 import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,8 +86,8 @@ class Camera:
 class Hits:
     """First surfaces along rays."""
 
-    length: Array  #: (n,) [m] along the ray, inf where nothing is hit
-    robot: NDArray[np.bool_]  #: (n,) true where the robot itself is hit
+    length: Array  #: (k, n) [m] along the ray, inf where nothing is hit
+    robot: NDArray[np.bool_]  #: (k, n) true where the robot itself is hit
 
 
 class World:
@@ -104,8 +106,9 @@ class World:
         self._robot = robot
         self._warnings: list[str] = []
         mujoco.set_mju_user_warning(self._warnings.append)
-        self._model = self._compile(obstacles)
+        self._model = copy.copy(_compiled(robot, len(obstacles)))
         self._data = mujoco.MjData(self._model)
+        self._put(obstacles)
         self._renderers: dict[tuple[int, int], Any] = {}
         self.place(np.zeros(robot.n_q))
 
@@ -124,27 +127,33 @@ class World:
         mujoco.mj_kinematics(self._model, self._data)
         self._check()
 
-    def cast(self, origin_W: Array, directions_W: Array, start: float = 0.0) -> Hits:
+    def cast(self, origins_W: Array, directions_W: Array, start: float = 0.0) -> Hits:
         """First hit of each ray on any surface of the robot or the scene.
 
         No link is left out: a sensor sees its own arm. Hits nearer than `start` belong to the
         sensor's own mounting; such a ray goes on behind them.
 
         Args:
-            origin_W: (3,) [m].
-            directions_W: (n, 3), unit length.
+            origins_W: (k, 3) [m], a row for each bundle of rays.
+            directions_W: (k, n, 3), unit length.
             start: [m] along the ray.
         """
-        n = len(directions_W)
+        bundles, n = directions_W.shape[:2]
         directions = np.ascontiguousarray(directions_W, np.float64)
-        origin = np.ascontiguousarray(origin_W, np.float64)
-        length, geom = np.empty(n), np.empty(n, np.int32)
-        mujoco.mj_multiRay(
-            self._model, self._data, origin, directions.ravel(), _CAST_GROUP, True, -1,
-            geom, length, None, n, mujoco.mjMAXVAL,
-        )  # fmt: skip
-        for ray in np.flatnonzero((length >= 0.0) & (length < start)):
-            self._cast_from(origin, directions[ray], start, length, geom, int(ray))
+        length, geom = np.empty((bundles, n)), np.empty((bundles, n), np.int32)
+        for row, origin in enumerate(np.ascontiguousarray(origins_W, np.float64)):
+            mujoco.mj_multiRay(
+                self._model, self._data, origin, directions[row].ravel(), _CAST_GROUP, True, -1,
+                geom[row], length[row], None, n, mujoco.mjMAXVAL,
+            )  # fmt: skip
+        found = np.empty(1, np.int32)
+        for row, ray in np.argwhere((length >= 0.0) & (length < start)):
+            direction = directions[row, ray]
+            beyond = mujoco.mj_ray(
+                self._model, self._data, origins_W[row] + start * direction, direction,
+                _CAST_GROUP, True, -1, found, None,
+            )  # fmt: skip
+            length[row, ray], geom[row, ray] = start + beyond, found[0]
         self._check()
         missed = geom < 0
         length[missed] = np.inf
@@ -187,17 +196,6 @@ class World:
         while self._renderers:
             self._renderers.popitem()[1].close()
 
-    def _cast_from(
-        self, origin: Array, direction: Array, start: float, length: Array,
-        geom: NDArray[np.int32], ray: int,
-    ) -> None:  # fmt: skip
-        found = np.empty(1, np.int32)
-        beyond = mujoco.mj_ray(
-            self._model, self._data, origin + start * direction, direction, _CAST_GROUP, True,
-            -1, found, None,
-        )  # fmt: skip
-        length[ray], geom[ray] = start + beyond, found[0]
-
     def _check(self) -> None:
         numbers = [int(number) for number in self._data.warning.number]
         if any(numbers) and not self._warnings:
@@ -206,30 +204,16 @@ class World:
             told, self._warnings[:] = "; ".join(self._warnings), []
             raise SimulationError(f"MuJoCo warned: {told}")
 
-    def _compile(self, obstacles: Sequence[Obstacle]) -> Any:
-        spec = mujoco.MjSpec()
-        spec.option.disableflags = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-        for row, name in enumerate(self._robot.link_names):
-            vertices_L, triangles = self._robot.full_mesh(name)
-            mesh = spec.add_mesh(name=name, inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL)
-            mesh.uservert = np.asarray(vertices_L, np.float64).ravel()
-            mesh.userface = np.asarray(triangles, np.int32).ravel()
-            body = spec.worldbody.add_body(name=name, mocap=True)
-            body.add_geom(
-                type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, contype=0, conaffinity=0,
-                rgba=_LINK_COLORS[row % 2],
-            )  # fmt: skip
-        for box in obstacles:
-            spec.worldbody.add_geom(
-                type=mujoco.mjtGeom.mjGEOM_BOX, size=0.5 * np.asarray(box.size),
-                pos=box.position, quat=_quaternion(box.pose()[:3, :3]), contype=0, conaffinity=0,
-                rgba=_OBSTACLE_COLOR,
-            )  # fmt: skip
-        _furnish(spec)
-        try:
-            return spec.compile()
-        except ValueError as error:
-            raise SimulationError(f"MuJoCo refuses the scene: {error}") from None
+    def _put(self, obstacles: Sequence[Obstacle]) -> None:
+        """Gives the compiled boxes their sizes and places, and all that MuJoCo derives of them."""
+        model = self._model
+        for geom, box in enumerate(obstacles):  # the first of all geoms
+            half = 0.5 * np.asarray(box.size)
+            model.geom_size[geom] = model.geom_aabb[geom, 3:] = half
+            model.geom_rbound[geom] = np.linalg.norm(half)
+            model.geom_pos[geom] = box.position
+            model.geom_quat[geom] = _quaternion(box.pose()[:3, :3])
+        mujoco.mj_setConst(model, self._data)
 
     def _renderer(self, size: tuple[int, int]) -> Any:
         if size not in self._renderers:
@@ -244,6 +228,42 @@ class World:
                     f"cannot draw off screen with MUJOCO_GL={backend}: {error}; {cure}"
                 ) from None
         return self._renderers[size]
+
+
+_models: WeakKeyDictionary[Robot, dict[int, Any]] = WeakKeyDictionary()
+
+
+def _compiled(robot: Robot, boxes: int) -> Any:
+    """The robot's links and that many boxes of no particular size; made once for each."""
+    known = _models.setdefault(robot, {})
+    if boxes not in known:
+        known[boxes] = _compile(robot, boxes)
+    return known[boxes]
+
+
+def _compile(robot: Robot, boxes: int) -> Any:
+    spec = mujoco.MjSpec()
+    spec.option.disableflags = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    for row, name in enumerate(robot.link_names):
+        vertices_L, triangles = robot.full_mesh(name)
+        mesh = spec.add_mesh(name=name, inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL)
+        mesh.uservert = np.asarray(vertices_L, np.float64).ravel()
+        mesh.userface = np.asarray(triangles, np.int32).ravel()
+        body = spec.worldbody.add_body(name=name, mocap=True)
+        body.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, contype=0, conaffinity=0,
+            rgba=_LINK_COLORS[row % 2],
+        )  # fmt: skip
+    for _ in range(boxes):
+        spec.worldbody.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_BOX, size=(0.5, 0.5, 0.5), contype=0, conaffinity=0,
+            rgba=_OBSTACLE_COLOR,
+        )  # fmt: skip
+    _furnish(spec)
+    try:
+        return spec.compile()
+    except ValueError as error:
+        raise SimulationError(f"MuJoCo refuses the scene: {error}") from None
 
 
 def _quaternion(rotation: Array) -> Array:

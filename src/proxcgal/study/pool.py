@@ -1,73 +1,55 @@
-"""Trials side by side: worker processes with progress, that end cleanly when told to."""
+"""Jobs side by side: worker processes with progress, that end cleanly when told to, or a cluster.
+
+Local workers are joblib's (loky), which come to life again when one was killed.
+"""
 
 from __future__ import annotations
 
 import os
-import signal
 import tempfile
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import (
+    ALL_COMPLETED,
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    wait,
+)
 from contextlib import contextmanager
-from multiprocessing import get_context
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-import numpy as np
-
 from proxcgal.errors import SimulationError
-
-Report = Callable[[float], None]  # called by a job with its share done, 0 to 1
-Job = Callable[[Report], Any]  # picklable; does the work
+from proxcgal.study.cluster import Cluster, work_far
+from proxcgal.study.jobs import Job, Progress, end_with, interrupts_blocked, work
 
 POLL_S = 0.1  # [s] between looks at the progress
-_STOP_SLOT = 0
-
-
-class StoppedError(Exception):
-    """Raised inside a job that was told to stop."""
-
-
-class Progress:
-    """Shares of all jobs done, and the word to stop, in a file that every process maps.
-
-    A mapped file needs no server process and no queue, and costs a job nothing.
-    """
-
-    def __init__(self, path: Path, jobs: int) -> None:
-        """Maps the file, made here where it is not there."""
-        if not path.exists():
-            np.zeros(jobs + 1).tofile(path)
-        self._shares = np.memmap(path, dtype=np.float64, mode="r+")
-
-    def report(self, job: int, share: float) -> None:
-        """Notes the share done; raises `StoppedError` where the run is to end."""
-        self._shares[1 + job] = share
-        if self._shares[_STOP_SLOT]:
-            raise StoppedError
-
-    def stop(self) -> None:
-        """Tells all jobs to stop at their next report."""
-        self._shares[_STOP_SLOT] = 1.0
-
-    def shares(self) -> list[float]:
-        """Share done of every job, in their order."""
-        return [float(share) for share in self._shares[1:]]
 
 
 class Pool:
-    """Runs jobs on worker processes, or here when one worker is enough.
+    """Runs jobs on worker processes, on a cluster, or here when one worker is enough.
 
     Ctrl-C reaches this process only: workers have it blocked, are told through the progress file,
-    close what they write, and are waited for.
+    close what they write, and are waited for. Workers whose master is gone end by themselves.
     """
 
-    def __init__(self, workers: int) -> None:
-        """A pool of that many processes, which start with the first job."""
-        self._executor: ProcessPoolExecutor | None = None
-        if workers > 1:
-            self._executor = ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
+    def __init__(self, workers: int, cluster: str | None = None) -> None:
+        """A pool of that many processes, which start with the first job.
+
+        Args:
+            workers: processes on this machine.
+            cluster: address of a dask.distributed scheduler, whose workers are taken instead.
+
+        Raises:
+            ConfigError: no such scheduler, or its workers have another proxcgal.
+        """
+        self._workers = workers
+        self._cluster = None if cluster is None else Cluster(cluster)
+        self._local: Any = None
 
     def __enter__(self) -> Self:
         """The pool itself."""
@@ -79,111 +61,183 @@ class Pool:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Waits for the workers to end."""
-        if self._executor is not None:
-            self._executor.shutdown(wait=True, cancel_futures=True)
+        """Waits for the workers to end; those of a cluster go on without us."""
+        if self._local is not None:
+            self._local.shutdown(wait=True)
+        if self._cluster is not None:
+            self._cluster.close()
 
     def run(
         self,
         jobs: Sequence[Job],
         on_progress: Callable[[list[float]], None] | None = None,
         on_done: Callable[[int, Any], None] | None = None,
+        on_lost: Callable[[int], Any] | None = None,
     ) -> list[Any]:
         """All jobs' results, in the jobs' order.
+
+        A job whose worker died is repeated once, alone, so that nobody else is blamed for it; a
+        cluster does so by itself.
 
         Args:
             jobs: each is called with a function that takes its share done.
             on_progress: called with all jobs' shares, now and then.
             on_done: called with a job's row and result, as each ends.
+            on_lost: called with the row of a job that killed its worker again; gives its result.
 
         Raises:
-            SimulationError: a worker process died (killed, or out of memory).
+            SimulationError: a worker died (killed, or out of memory) and nobody asked `on_lost`.
             Exception: the first that a job raised; the others are stopped.
         """
         with tempfile.TemporaryDirectory(prefix="proxcgal-") as folder:
             path = Path(folder) / "progress"
-            progress = Progress(path, len(jobs))
-            tell = on_progress or (lambda _: None)
-            done = on_done or (lambda *_: None)
-            if self._executor is None:
-                return self._run_here(jobs, progress, tell, done)
-            return self._run_there(self._executor, jobs, path, progress, tell, done)
+            run = _Run(
+                jobs, path, on_progress or (lambda _: None), on_done or (lambda *_: None),
+                on_lost or _died,
+            )  # fmt: skip
+            if self._cluster is not None:
+                run.far(self._cluster)
+            elif self._workers > 1:
+                run.near(self._workers, self._processes)
+            else:
+                run.here()
+            return run.results
 
-    @staticmethod
-    def _run_here(
-        jobs: Sequence[Job],
-        progress: Progress,
-        tell: Callable[[list[float]], None],
-        done: Callable[[int, Any], None],
-    ) -> list[Any]:
-        results = []
-        for row, job in enumerate(jobs):
+    def _processes(self, anew: bool) -> Executor:
+        """The local workers; `anew`: others in place of these, which are broken."""
+        if anew and self._local is not None:
+            self._local.shutdown(wait=True, kill_workers=True)
+            self._local = None
+        if self._local is None:
+            from joblib.externals.loky import ProcessPoolExecutor  # 0.1 s
 
-            def report(share: float, row: int = row) -> None:
-                progress.report(row, share)
-                tell(progress.shares())
+            self._local = ProcessPoolExecutor(
+                self._workers, initializer=end_with, initargs=(os.getpid(),)
+            )
+        executor: Executor = self._local
+        return executor
 
-            results.append(job(report))
-            report(1.0)
-            done(row, results[-1])
-        return results
 
-    @staticmethod
-    def _run_there(
-        executor: ProcessPoolExecutor,
+class _Run:
+    """One batch of jobs on its way."""
+
+    def __init__(
+        self,
         jobs: Sequence[Job],
         path: Path,
-        progress: Progress,
         tell: Callable[[list[float]], None],
         done: Callable[[int, Any], None],
-    ) -> list[Any]:
-        rows: dict[Future[Any], int] = {}
-        results: list[Any] = [None] * len(jobs)
+        lost: Callable[[int], Any],
+    ) -> None:
+        self._jobs = jobs
+        self._path = path
+        self._progress = Progress(path, len(jobs))
+        self._tell, self._done, self._lost = tell, done, lost
+        self._running: dict[Future[Any], int] = {}
+        self.results: list[Any] = [None] * len(jobs)
+
+    def here(self) -> None:
+        """One after the other, in this process."""
+        for row, job in enumerate(self._jobs):
+
+            def report(share: float, row: int = row) -> None:
+                self._progress.report(row, share)
+                self._tell(self._progress.shares())
+
+            self._take(row, job(report))
+
+    def near(self, workers: int, executor: Callable[[bool], Executor]) -> None:
+        """On worker processes; `executor` gives them, new ones where the others are broken.
+
+        Never more jobs under way than workers, so that it is known which a dead one had. Whoever
+        had one is suspected, and goes on alone.
+        """
+        waiting, suspects = deque(range(len(self._jobs))), deque[int]()
+        suspected: set[int] = set()
+        with self._stopped():
+            while waiting or suspects or self._running:
+                alone = bool(suspects) or not suspected.isdisjoint(self._running.values())
+                broken = False
+                while (suspects or waiting) and len(self._running) < (1 if alone else workers):
+                    if broken := not self._submit(executor(False), (suspects or waiting)[0]):
+                        break
+                    (suspects or waiting).popleft()
+                dead = self._collect(POLL_S, BrokenExecutor)
+                if dead or broken:  # one dead worker takes all the others with it
+                    dead += self._collect(None, BrokenExecutor)
+                    executor(True)
+                for row in dead:
+                    if row in suspected:
+                        self._take(row, self._lost(row))
+                    else:
+                        suspects.append(row)
+                        suspected.add(row)
+
+    def far(self, cluster: Cluster) -> None:
+        """On a cluster, which queues them and repeats those of dead workers itself."""
+        with self._stopped():
+            for row, job in enumerate(self._jobs):
+                self._running[cluster.executor.submit(work_far, job)] = row
+            while self._running:
+                try:
+                    dead = self._collect(POLL_S, cluster.killed)
+                except (CancelledError, ImportError) as error:  # gone, or a worker without us
+                    reason = str(error) or "it is gone"
+                    raise SimulationError(
+                        f"--cluster {cluster.address}: lost on the way: {reason}"
+                    ) from None
+                for row in dead:
+                    self._take(row, self._lost(row))
+
+    def _submit(self, executor: Executor, row: int) -> bool:
+        """Gives a job to the workers; false where one of them died meanwhile."""
         try:
-            with _interrupts_blocked():  # workers inherit it
-                for row, job in enumerate(jobs):
-                    rows[executor.submit(_work, job, str(path), row, len(jobs))] = row
-            waiting = set(rows)
-            while waiting:
-                ended, waiting = wait(waiting, timeout=POLL_S)
-                tell(progress.shares())
-                for future in ended:
-                    results[rows[future]] = future.result()
-                    done(rows[future], results[rows[future]])
-        except BrokenProcessPool:
-            raise SimulationError(
-                "a worker process died (killed, or out of memory); --workers 1 needs least memory"
-            ) from None
+            with interrupts_blocked():  # workers inherit it
+                future = executor.submit(work, self._jobs[row], str(self._path), row)
+        except BrokenExecutor:
+            return False
+        self._running[future] = row
+        return True
+
+    def _collect(self, timeout: float | None, died: type[BaseException]) -> list[int]:
+        """Takes what ended meanwhile (no timeout: all); the rows of those whose worker died."""
+        until = FIRST_COMPLETED if timeout else ALL_COMPLETED
+        ended, _ = wait(self._running, timeout, until)
+        self._tell(self._progress.shares())
+        dead = []
+        for future in ended:
+            row = self._running.pop(future)
+            try:
+                result = future.result()
+            except died:
+                dead.append(row)
+            else:
+                self._take(row, result)
+        return sorted(dead)
+
+    def _take(self, row: int, result: Any) -> None:
+        self.results[row] = result
+        self._progress.report(row, 1.0)
+        self._tell(self._progress.shares())
+        self._done(row, result)
+
+    @contextmanager
+    def _stopped(self) -> Iterator[None]:
+        """Whatever goes wrong: all jobs are told to stop, and those on this machine waited for."""
+        try:
+            yield
         except BaseException:
-            progress.stop()
-            for future in rows:
+            self._progress.stop()
+            for future in self._running:
                 future.cancel()
-            wait(rows)
+            wait([future for future in self._running if not future.cancelled()])
             raise
-        return results
 
 
-def _work(job: Job, path: str, row: int, jobs: int) -> Any:
-    """One job in a worker process."""
-    progress = Progress(Path(path), jobs)
-
-    def report(share: float) -> None:
-        progress.report(row, share)
-
-    report(0.0)
-    result = job(report)
-    report(1.0)
-    return result
-
-
-@contextmanager
-def _interrupts_blocked() -> Iterator[None]:
-    """No Ctrl-C for this thread, and for the processes that it starts, for good."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+def _died(row: int) -> Any:
+    raise SimulationError(
+        "a worker process died (killed, or out of memory); --workers 1 needs least memory"
+    )
 
 
 def default_workers(jobs: int) -> int:

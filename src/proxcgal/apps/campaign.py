@@ -1,0 +1,217 @@
+"""`proxcgal campaign`: many trials, on this machine or on a cluster."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+import time as clock
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import tyro
+
+from proxcgal.apps.options import Flag, Number, Settings, checked_workers, flat
+from proxcgal.errors import ConfigError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from proxcgal.sim.recorder import RecordedTicks
+    from proxcgal.study.campaign import Campaign, Ended, Trial
+    from proxcgal.study.kind import Kind
+    from proxcgal.study.pool import Pool
+    from proxcgal.study.store import Outcome, Store
+
+#: Module that holds each kind as its `KIND`.
+KINDS = {"static": "proxcgal.study.static"}
+
+
+@dataclass(frozen=True)
+class CampaignOptions:
+    """Run many trials, and say what they amount to.
+
+    static: panels, start postures and goals drawn at random round the static scenes, every draw
+    with all controllers.
+
+    Every finished trial is kept at once: the same command goes on where it was interrupted, and
+    more --runs go on where fewer ended. Writes trials.parquet (a row a trial), summary.json,
+    figures, recordings of the worst and report.html to DIR.
+
+    Examples:
+      proxcgal campaign static --runs 100
+      proxcgal campaign static --runs 20 --set controller.d_min=0.25 --out out/farther
+      proxcgal campaign static --runs 1000 --cluster tcp://10.0.0.1:8786
+    """
+
+    kind: Annotated[Literal["static"], tyro.conf.Positional, tyro.conf.arg(metavar="static")]
+    """What is repeated."""
+    runs: Annotated[int, tyro.conf.arg(metavar="N")] = 100
+    """Draws of each scene."""
+    seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
+    """Fixes every random draw."""
+    scenario: Annotated[
+        tuple[str, ...], tyro.conf.arg(metavar="NAME|PATH ...", help_behavior_hint="")
+    ] = ()
+    """Scenes to draw round, instead of front_plane and side_plane."""
+    set: Settings = ()
+    """Change keys of all scenarios, values as in TOML: controller.d_min=0.25"""
+    workers: Number = None
+    """Processes that simulate; left out: one a processor."""
+    cluster: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS", help_behavior_hint="")] = None
+    """A dask.distributed scheduler, whose workers simulate instead; each with --nthreads 1."""
+    keep: Annotated[str, tyro.conf.arg(metavar="worst:N|none")] = "worst:5"
+    """Trials to record, in DIR/recordings: the ticks that brought scans, to step through."""
+    every_tick: Flag = False
+    """Record every tick, so that `proxcgal replay FILE --set ...` can compute commands again."""
+    out: Annotated[
+        Path | None, tyro.conf.arg(metavar="DIR", help_behavior_hint="(default: out/campaign-KIND)")
+    ] = None
+    """Where results go, and where an interrupted campaign is found again."""
+    quiet: Flag = False
+    """No progress on stderr."""
+
+
+def campaign_command(options: CampaignOptions, command: str) -> int:
+    """Runs what is unfinished; prints tables, what was kept, what failed, the report's path."""
+    from proxcgal.apps.kept import keep_worst
+    from proxcgal.apps.origin import origin
+    from proxcgal.apps.progress import announce
+    from proxcgal.apps.report import write_report
+    from proxcgal.study.analysis import write_bytes, write_json
+    from proxcgal.study.figures import png
+    from proxcgal.study.kind import Wishes
+    from proxcgal.study.pool import Pool, default_workers
+    from proxcgal.study.store import Store
+    from proxcgal.study.table import parquet, tidy
+
+    begin = clock.monotonic()
+    workers, kept = checked_workers(options.workers), _kept(options)
+    wishes = Wishes(
+        runs=options.runs, seed=options.seed, scenarios=options.scenario,
+        overrides=tuple(flat(options.set)),
+    )  # fmt: skip
+    announce("drawing scenes (a robot's first time takes a while)", quiet=options.quiet)
+    kind: Kind = import_module(KINDS[options.kind]).KIND
+    campaign = kind.plan(wishes)
+    _check(campaign)
+    workers = workers or default_workers(len(campaign.trials))
+    folder = options.out or Path("out") / f"campaign-{options.kind}"
+    with (
+        Pool(workers, options.cluster) as pool,
+        Store(folder, {**campaign.description, "made_with": _packages()}) as store,
+    ):
+        ended = _perform(campaign, store, pool, folder, options.quiet)
+        table = tidy(ended, campaign.columns)
+        worst = kind.worst(table)[:kept]
+        chosen = [next(e for e in ended if e.trial.key == key) for key in worst]
+        ticks: RecordedTicks = "all" if options.every_tick else "scans"
+        recorded = keep_worst(chosen, folder, ticks, workers, quiet=options.quiet)
+        failed = [e for e in ended if e.outcome.error is not None]
+        summary = {
+            "campaign": options.kind, "seed": options.seed, "runs": options.runs,
+            "trials": len(ended), "failed": [_failure(e) for e in failed],
+            **kind.analyse(table, campaign), "worst": recorded,
+        }  # fmt: skip
+        for name, figure in kind.figures(table).items():
+            write_bytes(folder / name, png(figure))
+        write_bytes(folder / "trials.parquet", parquet(table))
+        write_json(folder / "run.json", origin(command) | _times(ended, begin))
+        write_json(folder / "summary.json", summary)
+        report = write_report(folder)
+    _print(kind, summary, folder)
+    print(report)
+    return 1 if failed else 0
+
+
+def _kept(options: CampaignOptions) -> int:
+    """How many of the worst are recorded. Raises: ConfigError: also for the other numbers."""
+    problems = []
+    form, _, count = options.keep.partition(":")
+    if options.keep != "none" and not (form == "worst" and count.isdecimal()):
+        problems.append(f"--keep {options.keep}: must be worst:N, such as worst:5, or none")
+    if options.runs < 1:
+        problems.append(f"--runs {options.runs}: must be 1 or more")
+    if options.seed < 0:
+        problems.append(f"--seed {options.seed}: must be 0 or more")
+    if problems:
+        raise ConfigError("\n".join(problems))
+    return int(count or 0)
+
+
+def _packages() -> dict[str, str]:
+    """What a trial's numbers depend on: those of other versions are not put beside them."""
+    from proxcgal.sim.recorder import versions
+
+    return {name: v for name, v in versions().items() if name not in ("python", "machine")}
+
+
+def _check(campaign: Campaign) -> None:
+    """Sets one trial of each scene up, so that nothing is written where something does not fit."""
+    from proxcgal.apps.results import check
+
+    firsts = {trial.scenario.name: trial for trial in reversed(campaign.trials)}
+    controllers = tuple(dict.fromkeys(trial.controller for trial in campaign.trials))
+    for trial in firsts.values():
+        check(trial.scenario, controllers, quiet=True)
+
+
+def _perform(
+    campaign: Campaign, store: Store, pool: Pool, folder: Path, quiet: bool
+) -> list[Ended]:
+    """Runs the unfinished trials under a progress bar."""
+    from proxcgal.apps.progress import Progress, announce
+    from proxcgal.study.campaign import run_campaign, unfinished
+
+    todo = unfinished(campaign, store)
+    there = len(campaign.trials) - len(todo)
+    if there:
+        announce(f"{there} of {len(campaign.trials)} trials are there already", quiet=quiet)
+    ended = there
+    sizes = [trial.scenario.duration for trial in todo]
+    with Progress("simulating", sizes, "s", quiet=quiet) as progress:
+
+        def done(trial: Trial, outcome: Outcome) -> None:
+            nonlocal ended
+            ended += 1
+            text = f"failed: {outcome.error}" if outcome.error else f"{outcome.wall_s:.1f} s"
+            progress.finished(f"{ended} of {len(campaign.trials)}: {trial.name}: {text}")
+
+        try:
+            return run_campaign(campaign, store, pool, progress.shares, done)
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(
+                f"{ended} of {len(campaign.trials)} trials are kept in {folder}; the same command "
+                "goes on from there"
+            ) from None
+
+
+def _failure(ended: Ended) -> dict[str, Any]:
+    return {
+        "name": ended.trial.name, "error": ended.outcome.error, "command": ended.trial.command
+    }  # fmt: skip
+
+
+def _times(ended: Sequence[Ended], begin: float) -> dict[str, float]:
+    """What it took: the last process alone, and all trials whenever they ran."""
+    return {
+        "wall_s": clock.monotonic() - begin,
+        "trials_wall_s": sum(e.outcome.wall_s for e in ended),
+        "simulated_s": sum(e.trial.scenario.duration for e in ended),
+    }
+
+
+def _print(kind: Kind, summary: dict[str, Any], folder: Path) -> None:
+    for listing in kind.listings(summary):
+        print(f"{listing}\n")
+    for sentence in kind.verdicts(summary):
+        print(sentence)
+    if summary["worst"]:
+        print("\nThe worst, recorded; what steps through each, and what runs it again:")
+    for entry in summary["worst"]:
+        print(f"  {shlex.join(('proxcgal', 'replay', str(folder / entry['recording'])))}")
+        print(f"    {entry['command']}")
+    for entry in summary["failed"]:
+        print(f"proxcgal: {entry['name']}: failed: {entry['error']}", file=sys.stderr)
+        print(f"proxcgal:   {entry['command']}", file=sys.stderr)

@@ -1,0 +1,82 @@
+"""The HTML of a report on a campaign."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterator
+from html import escape
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from proxcgal.apps.campaign import KINDS
+from proxcgal.apps.document import PICTURE_BYTES, document, origin_part, picture
+from proxcgal.apps.stored import StoredCampaign
+from proxcgal.errors import ConfigError
+
+if TYPE_CHECKING:
+    from proxcgal.study.kind import Kind, Listing
+
+
+def campaign_page(stored: StoredCampaign) -> str:
+    """The page of a campaign: valid HTML, everything inside.
+
+    Raises:
+        ConfigError: a kind that is not known here, or a summary of another form.
+    """
+    path, name = stored.folder / "summary.json", stored.summary["campaign"]
+    if name not in KINDS:
+        raise ConfigError(f"{path}: campaign = {name!r}: there are {', '.join(KINDS)}")
+    kind: Kind = import_module(KINDS[name]).KIND
+    try:
+        return document(kind.title, _parts(kind, stored))
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        reason = f"{type(error).__name__}: {error}"
+        raise ConfigError(f"{path}: not the summary of a {name} campaign: {reason}") from None
+
+
+def _parts(kind: Kind, stored: StoredCampaign) -> Iterator[str]:
+    summary = stored.summary
+    yield f"<p>{escape(kind.introduction)}</p>"
+    for sentence in kind.verdicts(summary):
+        yield f"<p>{escape(sentence)}</p>"
+    for listing in kind.listings(summary):
+        yield from _listing(listing)
+    budget = PICTURE_BYTES
+    for name, caption in kind.captions(summary).items():
+        part, used = picture(stored.folder / Path(name).name, caption, budget)
+        budget -= used
+        yield part
+    yield from _commands(stored)
+    yield from origin_part(stored.about)
+
+
+def _listing(listing: Listing) -> Iterator[str]:
+    yield f'<div class="scroll"><table><caption>{escape(listing.caption)}</caption><thead><tr>'
+    for column, (name, unit) in enumerate(zip(listing.names, listing.units, strict=True)):
+        side = ' class="left"' if column < listing.left else ""
+        small = f"<small>{escape(unit)}</small>" if unit else ""
+        yield f"<th{side}>{escape(name)}{small}</th>"
+    yield "</tr></thead><tbody>"
+    for row in listing.rows:
+        yield "<tr>"
+        for column, cell in enumerate(row):
+            side = ' class="left"' if column < listing.left else ""
+            yield f"<td{side}>{escape(cell)}</td>"
+        yield "</tr>"
+    yield "</tbody></table></div>"
+
+
+def _commands(stored: StoredCampaign) -> Iterator[str]:
+    """What steps through the worst trials, and what runs them and the failed ones again."""
+    if stored.summary["worst"]:
+        yield "<h2>The worst</h2>"
+    for entry in stored.summary["worst"]:
+        file = stored.folder / str(entry["recording"])
+        replay = shlex.join(("proxcgal", "replay", str(file)))
+        yield f'<pre class="wrap">{escape(replay)}\n{escape(str(entry["command"]))}</pre>'
+    if stored.summary["failed"]:
+        yield "<h2>Failed trials</h2>"
+    for entry in stored.summary["failed"]:
+        yield f"<p>{escape(str(entry['name']))}: {escape(str(entry['error']))}</p>"
+        yield f'<pre class="wrap">{escape(str(entry["command"]))}</pre>'

@@ -1,0 +1,126 @@
+"""True distances of a whole run, asked only where they can change a number of its summary.
+
+A distance between two postures changes by no more than the surfaces moved. What that proves to be
+no new least and no violation is not asked: least values, counts and what is asked are exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxcgal import _core
+from proxcgal.sim import boxes
+from proxcgal.sim.surfaces import Surfaces, inverse, moved
+
+if TYPE_CHECKING:
+    from proxcgal.models.robots import Robot
+    from proxcgal.sim.scenario_keys import Obstacle
+
+Array = NDArray[np.float64]
+
+#: Looked for beyond the least distance, so that a far pair is not asked at every tick [m].
+_AHEAD = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class DecisiveTruth:
+    """True distances over n ticks."""
+
+    distance: Array  #: (n,) [m] robot to scene, inf without a scene; nan: not asked
+    link: list[str]  #: nearest to the scene, "" where not asked
+    own: Array  #: (n,) [m] between the robot's own links, inf without pairs; nan: not asked
+
+
+def decisive_truth(
+    robot: Robot, obstacles: Sequence[Obstacle], q: Array, wanted: NDArray[np.bool_], under: float
+) -> DecisiveTruth:
+    """Distances to the scene and between own links, as `Truth` has them, where they decide.
+
+    Args:
+        robot: its full meshes are asked.
+        obstacles: the scene.
+        q: (n, n_q) posture of each tick.
+        wanted: (n,) ticks at which the distance to the scene is asked in any case.
+        under: so is it wherever it is smaller than this [m].
+    """
+    surfaces = Surfaces.of(robot)
+    poses_W = np.array([robot.link_poses(posture) for posture in q]).reshape(len(q), -1, 4, 4)
+    moving = np.array(surfaces.moving, np.intp)
+    scene = _Pairs(surfaces, len(q))
+    for box in obstacles:
+        tree = _core.MeshTree(*boxes.surface(box.size, np.eye(4)))
+        for link in moving:
+            scene.add(tree, int(link), inverse(box.pose()) @ poses_W[:, link])
+    scene.ask_least(under)
+    scene.ask(np.flatnonzero(wanted))
+    own = _Pairs(surfaces, len(q))
+    for a, b in surfaces.self_pairs:
+        own.add(surfaces.trees[a], int(b), inverse(poses_W[:, a]) @ poses_W[:, b])
+    own.ask_least(0.0)
+    names = robot.link_names
+    link = [names[scene.links[row]] if row >= 0 else "" for row in scene.nearest]
+    return DecisiveTruth(scene.distance, link, own.distance)
+
+
+class _Pairs:
+    """Surfaces that may come near one another, and what is known of their distances."""
+
+    def __init__(self, surfaces: Surfaces, ticks: int) -> None:
+        self._surfaces = surfaces
+        self._trees: list[_core.MeshTree] = []
+        self._T_AB: list[Array] = []
+        self._sweeps: list[Array] = []
+        self._at_least = np.zeros((0, ticks))
+        self.links: list[int] = []  # second surface of each pair
+        self.distance = np.full(ticks, np.nan)
+        self.nearest = np.full(ticks, -1)
+
+    def add(self, tree: _core.MeshTree, link: int, T_AB: Array) -> None:
+        """A surface and a link with its pose (n, 4, 4) in that surface's frame."""
+        self._trees.append(tree)
+        self._T_AB.append(T_AB)
+        self._sweeps.append(self._surfaces.sweep(np.full(len(T_AB), link), T_AB))
+        self._at_least = np.pad(self._at_least, ((0, 1), (0, 0)))
+        self.links.append(link)
+
+    def ask_least(self, under: float) -> None:
+        """Asks until no other tick can have the least distance, or one smaller than `under`."""
+        if not self.links:
+            self.distance[:] = np.inf
+            return
+        least = np.inf
+        at_least = self._at_least.min(axis=0)
+        while len(at_least):
+            tick = int(at_least.argmin())
+            if at_least[tick] >= max(least, under):
+                return
+            self._ask(tick)
+            least = min(least, self.distance[tick])
+            at_least = self._at_least.min(axis=0)
+            at_least[np.isfinite(self.distance)] = np.inf
+
+    def ask(self, ticks: NDArray[np.intp]) -> None:
+        """Asks these ticks, unless they were."""
+        for tick in ticks:
+            if np.isnan(self.distance[tick]):
+                self._ask(int(tick))
+
+    def _ask(self, tick: int) -> None:
+        best, nearest = np.inf, -1
+        for row in np.argsort(self._at_least[:, tick]):
+            if self._at_least[row, tick] >= best:
+                break
+            bound = best + _AHEAD
+            other, T_AB = self._surfaces.trees[self.links[row]], self._T_AB[row][tick]
+            distance = min(self._trees[row].distance(other, T_AB, bound)[0], bound)
+            sweep = self._sweeps[row]
+            nearer = distance - moved(sweep[tick : tick + 1], sweep)
+            np.maximum(self._at_least[row], nearer, out=self._at_least[row])
+            if distance < best:
+                best, nearest = distance, int(row)
+        self.distance[tick], self.nearest[tick] = best, nearest

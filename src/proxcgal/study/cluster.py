@@ -1,0 +1,89 @@
+"""Workers of a dask.distributed scheduler: another machine's processes, or a hundred machines'."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from concurrent.futures import Executor
+from importlib import import_module
+from typing import Any
+
+from proxcgal.errors import ConfigError
+from proxcgal.sim.recorder import versions
+
+CONNECT_S = 10.0  # [s] in which a scheduler has to answer
+
+_alone = threading.Lock()  # MuJoCo's warnings belong to a process: one job at a time in each
+
+
+class Cluster:
+    """A scheduler that somebody else started, and the workers that it has."""
+
+    def __init__(self, address: str) -> None:
+        """Connects.
+
+        Args:
+            address: of the scheduler, such as tcp://10.0.0.1:8786.
+
+        Raises:
+            ConfigError: nobody answers there, or a worker has other versions than this process.
+        """
+        try:
+            distributed: Any = import_module("distributed")  # 0.5 s; ships half of its types
+        except ImportError:
+            raise ConfigError(
+                f"--cluster {address}: needs the package distributed: "
+                "pip install 'proxcgal[cluster]'"
+            ) from None
+        for name in ("distributed", "distributed.client"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)  # what it means, we tell in a line
+        self.address = address
+        #: What a job that kills every worker it is given to ends as.
+        self.killed: type[Exception] = distributed.KilledWorker
+        try:
+            self._client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
+        except (OSError, ValueError) as error:
+            raise ConfigError(
+                f"--cluster {address}: no scheduler answers there: {_first_line(error)}; "
+                "it takes the address that `dask scheduler` prints, such as tcp://10.0.0.1:8786"
+            ) from None
+        self.executor: Executor = self._client.get_executor(pure=False)
+        try:
+            self._compare()
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Gives up what still runs there, and leaves; the scheduler goes on."""
+        self._client.close()
+
+    def _compare(self) -> None:
+        """Workers that came later are not asked; each is another machine's own business."""
+        try:
+            found: dict[str, dict[str, str]] = self._client.run(versions)
+        except Exception as error:
+            raise ConfigError(
+                f"--cluster {self.address}: a worker has no proxcgal that can be used: "
+                f"{type(error).__name__}: {_first_line(error)}"
+            ) from None
+        own = versions()
+        apart = [
+            f"--cluster {self.address}: worker {worker} has {name} {told.get(name)}, "
+            f"this machine {own.get(name)}: all must be the same"
+            for worker, told in sorted(found.items())
+            for name in sorted((own.keys() | told.keys()) - {"machine", "python"})
+            if told.get(name) != own.get(name)
+        ]
+        if apart:
+            raise ConfigError("\n".join(apart))
+
+
+def work_far(job: Any) -> Any:
+    """One job on a worker of the cluster; nobody there is told the share done."""
+    with _alone:
+        return job(lambda _: None)
+
+
+def _first_line(error: BaseException) -> str:
+    return (str(error).splitlines() or [type(error).__name__])[0]

@@ -1,0 +1,55 @@
+"""What a kind of campaign is: trials out of wishes, and findings out of the trials' table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from proxcgal.study.analysis import Summary, aligned
+from proxcgal.study.campaign import Campaign
+
+if TYPE_CHECKING:
+    import polars as pl
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wishes:
+    """What a user asks a campaign for."""
+
+    runs: int  # draws of each scene
+    seed: int
+    scenarios: tuple[str, ...] = ()  # names or files, instead of the kind's own
+    overrides: tuple[str, ...] = ()  # `key.sub=value`, for all trials
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Listing:
+    """A table for people, in a terminal and on a page."""
+
+    caption: str
+    names: Sequence[str]  # of the columns
+    units: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    left: int  # so many columns flush left
+
+    def __str__(self) -> str:
+        """Its lines, for a terminal."""
+        units = [f"[{unit}]" if unit else "" for unit in self.units]
+        return aligned([self.names, units, *self.rows], left=self.left, heads=2)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kind:
+    """One kind of campaign; a further one needs no more than this."""
+
+    title: str  # of its page
+    introduction: str  # below the title
+    plan: Callable[[Wishes], Campaign]
+    analyse: Callable[[pl.DataFrame, Campaign], Summary]
+    listings: Callable[[Summary], list[Listing]]
+    verdicts: Callable[[Summary], list[str]]  # a sentence each, from the numbers
+    figures: Callable[[pl.DataFrame], dict[str, Figure]]  # by file
+    captions: Callable[[Summary], dict[str, str]]  # of the same files
+    worst: Callable[[pl.DataFrame], list[str]]  # keys of trials, the worst first

@@ -1,0 +1,202 @@
+"""The static scenes drawn anew: what whole-body avoidance gains, and what sensing costs it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import polars as pl
+
+from proxcgal.errors import ConfigError
+from proxcgal.sim.scenario import CONTROLLERS, Scenario, load_scenario
+from proxcgal.sim.setup import Setup
+from proxcgal.study.analysis import (
+    CONTROLLER_KEYS,
+    NOTHING_M,
+    SELF_LIMIT_M,
+    Summary,
+)
+from proxcgal.study.bootstrap import median_interval
+from proxcgal.study.campaign import Campaign, Trial
+from proxcgal.study.draws import draw_scene
+from proxcgal.study.jobs import Report
+from proxcgal.study.kind import Kind, Wishes
+from proxcgal.study.static_words import captions, figures, listings, verdicts
+from proxcgal.study.store import Row
+from proxcgal.study.trials import robot_of, simulate
+
+SCENES = ("front_plane", "side_plane")
+#: Of the trials under 0.05 m: the cloud's nearest point was this much farther away than the panel
+#: really was, when that was nearest.
+UNSEEN_M = 0.05
+_HELD = 2  # modes from here on: HOLD, STOP
+_AXES = ("x", "y", "z")
+_ANGLES = ("roll", "pitch", "yaw")
+
+
+def plan(wishes: Wishes) -> Campaign:
+    """Every controller on the same draws round each scene; the sensors' noise is the draw's own.
+
+    Raises:
+        ProxError: a scene that nothing can be drawn round, or that does not load.
+    """
+    trials: list[Trial] = []
+    redrawn: dict[str, dict[str, int]] = {}
+    sources = wishes.scenarios or SCENES
+    if "seed" in (assignment.partition("=")[0].strip() for assignment in wishes.overrides):
+        raise ConfigError("--set seed=...: every draw has its own; --seed fixes them all")
+    for source in sources:
+        base = load_scenario(source, wishes.overrides)
+        robot = robot_of(base)
+        Setup.of(base, robot)  # tells what does not fit before anything is drawn
+        if base.name in redrawn:
+            raise ConfigError(f"--scenario {source}: there is another one named {base.name}")
+        reasons: Counter[str] = Counter()
+        for number in range(wishes.runs):
+            draw = draw_scene(base, robot, wishes.seed, number)
+            reasons += draw.redrawn
+            trials += [
+                Trial(
+                    scenario=draw.scenario, source=source,
+                    overrides=(*wishes.overrides, *draw.overrides), controller=controller,
+                    seed=wishes.seed + number, tags={"scene": base.name, "draw": number},
+                )
+                for controller in CONTROLLERS
+            ]  # fmt: skip
+        redrawn[base.name] = dict(sorted(reasons.items()))
+    description = {
+        "kind": "static", "seed": wishes.seed, "scenarios": list(sources),
+        "set": list(wishes.overrides),
+    }  # fmt: skip
+    return Campaign(
+        description=description, trials=trials, perform=perform, columns=_columns(trials[0]),
+        notes={"redrawn": redrawn},
+    )  # fmt: skip
+
+
+def perform(trial: Trial, report: Report) -> Row:
+    """One trial's numbers, beside what was drawn for it."""
+    log = simulate(trial.scenario, trial.controller, trial.seed, report)
+    numbers = log.summary()
+    row: Row = {key: numbers[key] for key in CONTROLLER_KEYS}
+    nearest = int(np.nanargmin(log.true_m))
+    row["true_min_link"] = log.true_link[nearest]
+    row["seen_at_true_min_m"] = min(float(log.seen_m[nearest]), NOTHING_M)
+    row["leaked_points_max"] = numbers["leaked_points_max"]
+    row["held_ticks"] = int((log.mode >= _HELD).sum())
+    return row | _drawn(trial.scenario)
+
+
+def _drawn(scenario: Scenario) -> Row:
+    panel, offset = scenario.obstacles[0], scenario.goal.offset or ()
+    groups = (
+        ("panel_{}_m", _AXES, panel.position),
+        ("panel_{}_rad", _ANGLES, panel.rpy),
+        ("goal_offset_{}_m", _AXES, offset),
+        ("q0_{}", range(len(scenario.q0)), scenario.q0),
+    )
+    return {
+        form.format(name): float(value)
+        for form, names, values in groups
+        for name, value in zip(names, values, strict=True)
+    }
+
+
+def _columns(trial: Trial) -> tuple[str, ...]:
+    own = ("true_min_link", "seen_at_true_min_m", "leaked_points_max", "held_ticks")
+    return (*CONTROLLER_KEYS, *own, *_drawn(trial.scenario))
+
+
+def analyse(table: pl.DataFrame, campaign: Campaign) -> Summary:
+    """The numbers of `summary.json`: per scene and controller, and paired over the draws.
+
+    `gain_mm` is the true distance at the end (mean of the last 2 s), wb over sm; `sensing_cost_mm`
+    the same, wb_known over wb. Only draws that all three controllers ended count there.
+    """
+    scenes = {}
+    for (scene,), own in table.group_by(["scene"], maintain_order=True):
+        ends = {
+            name: dict(
+                own.filter(pl.col("controller") == name, pl.col("error").is_null())
+                .select("draw", "true_final_m")
+                .iter_rows()
+            )
+            for name in CONTROLLERS
+        }
+        scenes[str(scene)] = {
+            "draws": own["draw"].n_unique(),
+            "redrawn": campaign.notes["redrawn"][scene],
+            "controllers": {
+                str(name): _controller(part)
+                for (name,), part in own.group_by(["controller"], maintain_order=True)
+            },
+            "gain_mm": _paired(ends["wb"], ends["sm"]),
+            "sensing_cost_mm": _paired(ends["wb_known"], ends["wb"]),
+        }
+    return {
+        "robot": campaign.trials[0].scenario.robot,
+        "scenes": scenes,
+        "self_min_m": table["self_min_m"].min(),
+        "self_under_limit": int((table["self_min_m"] < SELF_LIMIT_M).sum()),
+    }
+
+
+def _controller(part: pl.DataFrame) -> Summary:
+    done = part.filter(pl.col("error").is_null())
+    if done.is_empty():
+        return {"trials": 0}
+    close = done.filter(pl.col("violations") > 0)
+    unseen = close["seen_at_true_min_m"] - close["true_min_m"] > UNSEEN_M
+    return {
+        "trials": len(done),
+        **{
+            key: _spread(done[key].to_numpy())
+            for key in ("true_min_m", "true_final_m", "goal_error_m")
+        },
+        "violating_trials": len(close),
+        "violating_share": len(close) / len(done),
+        "unseen_trials": int(unseen.sum()),
+        "violations": int(done["violations"].sum()),
+        "held_trials": int((done["held_ticks"] > 0).sum()),
+        "self_min_m": done["self_min_m"].min(),
+        "self_under_limit": int((done["self_min_m"] < SELF_LIMIT_M).sum()),
+    }
+
+
+def _spread(values: Any) -> dict[str, float]:
+    names = ("min", "p5", "median", "p95", "max")
+    return dict(zip(names, np.percentile(values, [0, 5, 50, 95, 100]).tolist(), strict=True))
+
+
+def _paired(more: Mapping[int, float], less: Mapping[int, float]) -> Summary | None:
+    """Distribution of a difference over the draws that both have [mm]; None without any."""
+    draws = sorted(more.keys() & less.keys())
+    apart = [1000.0 * (more[d] - less[d]) for d in draws if NOTHING_M not in (more[d], less[d])]
+    interval = median_interval(apart)
+    if interval is None:
+        return None
+    return {
+        "pairs": len(apart), "median": interval.median, "low": interval.low, "high": interval.high,
+        "p5": float(np.percentile(apart, 5)), "p95": float(np.percentile(apart, 95)),
+        "positive_share": float(np.mean(np.array(apart) > 0.0)),
+    }  # fmt: skip
+
+
+def worst(table: pl.DataFrame) -> list[str]:
+    """The whole-body trials, those first that came nearest to the panel, or were so for longer."""
+    ours = table.filter(pl.col("controller") == "wb", pl.col("error").is_null())
+    order = ours.sort("true_min_m", "violations", "key", descending=[False, True, False])
+    return order["key"].to_list()
+
+
+KIND = Kind(
+    title="Static scenes, drawn at random",
+    introduction="Panels, start postures and goals drawn round the paper's static scenes; every "
+    "controller meets the same draws, with the same noise of the sensors. wb moves the nearest "
+    "point of the whole arm, sm only the sensors' mounting points; wb_known is wb on points of the "
+    "scene itself, the ceiling, not a result of ours.",
+    plan=plan, analyse=analyse, listings=listings, verdicts=verdicts, figures=figures,
+    captions=captions, worst=worst,
+)  # fmt: skip

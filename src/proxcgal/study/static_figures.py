@@ -1,0 +1,103 @@
+"""Distributions over drawn scenes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import polars as pl
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from proxcgal.sim.trial_log import TOO_CLOSE
+from proxcgal.study.analysis import NOTHING_M
+from proxcgal.study.bootstrap import median_interval
+from proxcgal.study.figures import COLOURS, DPI, GREY, LEGEND, NAMES
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+_DOTTED: Any = (0, (1, 1.5))
+_GAIN, _COST = "#333333", "#CC79A7"
+
+
+def scene_figure(scene: str, table: pl.DataFrame) -> Figure:
+    """Ends of all controllers, pairs of wb and sm, differences: over the draws of one scene.
+
+    Args:
+        scene: its name, above the figure.
+        table: its trials; those that failed, or see no panel, are left out.
+    """
+    done = table.filter(pl.col("error").is_null(), pl.col("true_final_m") < NOTHING_M)
+    ends = {
+        str(name): dict(part.select("draw", "true_final_m").iter_rows())
+        for (name,), part in done.group_by(["controller"], maintain_order=True)
+    }
+    figure = Figure(figsize=(10.2, 3.7), dpi=DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    figure.suptitle(
+        f"{scene}: {table['draw'].n_unique()} random scenes", fontsize=12, fontweight="bold"
+    )
+    axes = figure.subplots(1, 3, width_ratios=(1.1, 1.0, 1.1))
+    _ends(axes[0], ends)
+    _pairs(axes[1], *_both(ends, "wb", "sm"))
+    _differences(axes[2], ends)
+    for letter, ax in zip("abc", axes, strict=True):
+        ax.tick_params(labelsize=9)
+        ax.spines[["top", "right"]].set_visible(False)
+        ax.set_title(f"({letter})", loc="left", fontsize=10)
+    lines = [line for ax in axes[::2] for line in ax.get_legend_handles_labels()[0]]
+    figure.legend(
+        lines, [str(line.get_label()) for line in lines], loc="outside lower center",
+        ncols=len(lines), columnspacing=1.6, **LEGEND,
+    )  # fmt: skip
+    return figure
+
+
+def _both(
+    ends: dict[str, dict[int, float]], one: str, other: str
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Both controllers' ends in the draws that both have [m]."""
+    first, second = ends.get(one, {}), ends.get(other, {})
+    draws = sorted(first.keys() & second.keys())
+    return np.array([first[d] for d in draws]), np.array([second[d] for d in draws])
+
+
+def _ends(ax: Axes, ends: dict[str, dict[int, float]]) -> None:
+    for name, by_draw in ends.items():
+        ax.ecdf(
+            list(by_draw.values()), color=COLOURS.get(name, "black"), label=NAMES.get(name, name),
+            linewidth=1.6,
+        )  # fmt: skip
+    ax.axvline(TOO_CLOSE, color=GREY, linewidth=1.0, linestyle=_DOTTED)
+    ax.set_xlim(left=0.0)
+    ax.set_xlabel("true distance at the end [m]", fontsize=10)
+    ax.set_ylabel("share of draws [-]", fontsize=10)
+
+
+def _pairs(ax: Axes, wb: NDArray[np.float64], sm: NDArray[np.float64]) -> None:
+    top = 1.05 * max([0.1, *wb, *sm])
+    ax.plot((0.0, top), (0.0, top), color=GREY, linewidth=1.0, linestyle=_DOTTED)
+    ax.scatter(sm, wb, s=14, color=COLOURS["wb"], alpha=0.6, linewidths=0.0)
+    ax.set_xlim(0.0, top)
+    ax.set_ylim(0.0, top)
+    ax.set_aspect("equal")
+    ax.set_xlabel("sm, true distance at the end [m]", fontsize=10)
+    ax.set_ylabel("wb, true distance at the end [m]", fontsize=10)
+
+
+def _differences(ax: Axes, ends: dict[str, dict[int, float]]) -> None:
+    for one, other, colour, label in (
+        ("wb", "sm", _GAIN, "gain, WB - SM"),
+        ("wb_known", "wb", _COST, "cost of sensing, known - WB"),
+    ):
+        first, second = _both(ends, one, other)
+        apart = 1000.0 * (first - second)
+        interval = median_interval(apart.tolist())
+        if interval is not None:
+            ax.ecdf(apart, color=colour, label=label, linewidth=1.6)
+            ax.axvspan(interval.low, interval.high, color=colour, alpha=0.18, linewidth=0.0)
+    ax.axvline(0.0, color=GREY, linewidth=1.0, linestyle=_DOTTED)
+    ax.set_xlabel("difference at the end [mm]", fontsize=10)
+    ax.set_ylabel("share of draws [-]", fontsize=10)

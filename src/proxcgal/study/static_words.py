@@ -1,0 +1,127 @@
+"""What the drawn static scenes amount to, for people: tables, sentences, figures."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from proxcgal.study.analysis import SELF_LIMIT_M, Summary, shown
+from proxcgal.study.campaign import plain
+from proxcgal.study.kind import Listing
+from proxcgal.study.static_figures import scene_figure
+
+if TYPE_CHECKING:
+    import polars as pl
+    from matplotlib.figure import Figure
+
+
+def listings(summary: Summary) -> list[Listing]:
+    """A row a controller and scene, then a row a comparison."""
+    rows, pairs = [], []
+    for scene, found in summary["scenes"].items():
+        for name, numbers in found["controllers"].items():
+            rows.append((scene, name, *_cells(numbers)))
+        for name in ("gain_mm", "sensing_cost_mm"):
+            pairs.append((scene, _COMPARISONS[name], *_pair_cells(found[name])))
+    return [
+        Listing(
+            caption="True distance to the panel: medians over the draws, with the 5 % quantile "
+            "and the least. Final: mean of the last 2 s. Too close: trials that came under 0.05 m "
+            "of it. Unseen: those of them in which the cloud's nearest point was then more than "
+            "0.05 m farther away than the panel. Own links: the least of all trials.",
+            names=("scene", "controller", "trials", "min", "5 %", "least", "final", "5 %",
+                   "too close", "unseen", "own links"),
+            units=("", "", "", "m", "m", "m", "m", "m", "trials", "trials", "m"),
+            rows=rows, left=2,
+        ),
+        Listing(
+            caption="Paired over the draws, true distance at the end: median with its 95 % "
+            "bootstrap interval, 5 % and 95 % quantiles, share of draws above 0.",
+            names=("scene", "comparison", "pairs", "median", "95 % from", "to", "5 %", "95 %",
+                   "above 0"),
+            units=("", "", "", "mm", "mm", "mm", "mm", "mm", "%"),
+            rows=pairs, left=2,
+        ),
+    ]  # fmt: skip
+
+
+_COMPARISONS = {"gain_mm": "gain, wb - sm", "sensing_cost_mm": "sensing, wb_known - wb"}
+
+
+def _cells(numbers: Summary) -> tuple[str, ...]:
+    if not numbers["trials"]:
+        return ("0", *"--------")
+    low, final = numbers["true_min_m"], numbers["true_final_m"]
+    return (
+        str(numbers["trials"]),
+        *(shown(low[key]) for key in ("median", "p5", "min")),
+        *(shown(final[key]) for key in ("median", "p5")),
+        str(numbers["violating_trials"]),
+        str(numbers["unseen_trials"]),
+        shown(numbers["self_min_m"]),
+    )
+
+
+def _pair_cells(paired: Summary | None) -> tuple[str, ...]:
+    if paired is None:
+        return ("0", *"------")
+    lengths = (f"{paired[key]:+.0f}" for key in ("median", "low", "high", "p5", "p95"))
+    return (str(paired["pairs"]), *lengths, f"{100.0 * paired['positive_share']:.0f}")
+
+
+def verdicts(summary: Summary) -> list[str]:
+    """What the numbers say, a sentence a scene; then what was drawn again, and own links."""
+    told = []
+    for scene, found in summary["scenes"].items():
+        gain, cost = found["gain_mm"], found["sensing_cost_mm"]
+        if gain is not None:
+            sure = gain["low"] > 0.0 or gain["high"] < 0.0
+            text = (
+                f"{scene}: wb ends {gain['median']:+.0f} mm farther away than sm in the median "
+                f"(95 % interval {gain['low']:+.0f} to {gain['high']:+.0f} mm, which "
+                f"{'excludes' if sure else 'includes'} 0)"
+            )
+            if cost is not None:
+                text += f"; sensing costs wb {cost['median']:.0f} mm against a known scene"
+            told.append(text + ".")
+        ours = found["controllers"].get("wb", {})
+        if ours.get("violating_trials"):
+            told.append(
+                f"{scene}: wb came under 0.05 m in {ours['violating_trials']} of {ours['trials']} "
+                f"trials, in {ours['unseen_trials']} of them unseen: the cloud showed nothing that "
+                "near."
+            )
+        again = ", ".join(f"{reason} {count}" for reason, count in found["redrawn"].items())
+        told.append(f"{scene}: {found['draws']} draws; drawn again: {again or 'none'}.")
+    if summary["self_under_limit"]:
+        told.append(
+            f"Trials in which the arm came within {SELF_LIMIT_M} m of itself: "
+            f"{summary['self_under_limit']}. By the rule of single runs these have failed; they "
+            "are counted all the same: no law here avoids the own arm."
+        )
+    return told
+
+
+def figures(table: pl.DataFrame) -> dict[str, Figure]:
+    """One a scene: distributions at the end, pairs, differences."""
+    return {
+        _file(str(scene)): scene_figure(str(scene), own)
+        for (scene,), own in table.group_by(["scene"], maintain_order=True)
+    }
+
+
+def captions(summary: Summary) -> dict[str, str]:
+    """What the figures show."""
+    return {_file(scene): f"{scene}: {_CAPTION}" for scene in summary["scenes"]}
+
+
+def _file(scene: str) -> str:
+    return f"{plain(scene)}.png"
+
+
+_CAPTION = (
+    "random panels, start postures and goals. (a) Share of the draws that end nearer to the panel "
+    "than a distance, per controller; dotted: 0.05 m, under which a tick is a violation. (b) Each "
+    "draw's true distance at the end, wb over sm: above the diagonal the whole body keeps farther "
+    "away. (c) Share of the draws whose difference is smaller: what wb gains over sm, and what a "
+    "known scene would give on top; bands: 95 % bootstrap intervals of the medians."
+)

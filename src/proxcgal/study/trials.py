@@ -1,0 +1,71 @@
+"""One trial, in whichever process: the robot loaded once, the run measured or recorded."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from proxcgal.errors import ModelWarning
+from proxcgal.sim.recorder import RecordedTicks, Recorder
+from proxcgal.sim.setup import make_robot
+from proxcgal.sim.trial import run_trial
+
+if TYPE_CHECKING:
+    from proxcgal.models import Robot
+    from proxcgal.sim.scenario import Scenario
+    from proxcgal.sim.trial import TrialLog
+    from proxcgal.study.jobs import Report
+
+_KEPT = 4  # robots, with all that is made of them once
+_robots: dict[Any, Robot] = {}
+
+
+def simulate(
+    scenario: Scenario,
+    controller: str,
+    seed: int,
+    report: Report,
+    *,
+    recording: Path | None = None,
+    ticks: RecordedTicks = "all",
+) -> TrialLog:
+    """Runs a trial in a worker process.
+
+    Args:
+        scenario: what to run.
+        controller: one of CONTROLLERS.
+        seed: instead of the scenario's.
+        report: is told the share done.
+        recording: where to record to; without, true distances are asked only where they decide.
+        ticks: which of them the recording holds.
+
+    Raises:
+        ProxError: what of the scenario does not fit; the simulator warned.
+    """
+    with warnings.catch_warnings():
+        # What there is to say of a model was said when the set-up was checked, and a recording
+        # that stops early is in the log.
+        warnings.simplefilter("ignore", ModelWarning)
+        warnings.simplefilter("ignore", RuntimeWarning)
+        robot = robot_of(scenario)
+        if recording is None:
+            return run_trial(
+                scenario, controller, seed=seed, robot=robot, on_progress=report, sparse_truth=True
+            )
+        with Recorder(recording, ticks) as recorder:
+            return run_trial(
+                scenario, controller, seed=seed, robot=robot, recorder=recorder, on_progress=report
+            )
+
+
+def robot_of(scenario: Scenario) -> Robot:
+    """The scenario's robot, loaded once a process. Raises: ConfigError, ModelError."""
+    settings = (
+        scenario.robot, scenario.package_dirs, scenario.vertices_per_link, scenario.limits
+    )  # fmt: skip
+    if settings not in _robots:
+        while len(_robots) >= _KEPT:
+            _robots.pop(next(iter(_robots)))
+        _robots[settings] = make_robot(scenario)
+    return _robots[settings]

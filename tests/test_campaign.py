@@ -1,0 +1,526 @@
+"""Many trials: none is repeated, none is lost, and how they were run changes no number."""
+
+import json
+import os
+import random
+import shlex
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+from typing import NamedTuple
+
+import numpy as np
+import polars as pl
+import pytest
+from scipy import stats
+
+import proxcgal as px
+from proxcgal.apps import cli
+from proxcgal.sim.recording import read_recording
+from proxcgal.sim.replay import first_difference
+from proxcgal.sim.scenario import load_scenario
+from proxcgal.sim.truth import Truth
+from proxcgal.study import static
+from proxcgal.study.bootstrap import median_interval
+from proxcgal.study.campaign import Campaign, Trial, run_campaign, unfinished
+from proxcgal.study.draws import crosses, draw_scene, reachable
+from proxcgal.study.kind import Wishes
+from proxcgal.study.pool import Pool
+from proxcgal.study.store import Outcome, Store
+
+SMALL = ("--scenario", "front_plane", "--runs", "2", "--set", "duration=0.2")
+ONE = (*SMALL[:3], "1", *SMALL[4:], "--workers", "1", "--quiet")
+WISHES = Wishes(runs=2, seed=0, scenarios=("front_plane",), overrides=("duration=0.2",))
+PROGRAM = [sys.executable, "-c", "import sys; from proxcgal.apps.cli import main; sys.exit(main())"]
+
+PERFORM = """
+import os, signal
+from pathlib import Path
+
+def ours(trial):
+    return (trial.controller, trial.tags["draw"]) == ("sm", 0)
+
+def numbers(trial, report):
+    report(0.5)
+    return {"number": trial.tags["draw"] + len(trial.controller)}
+
+def dies_once(trial, report):
+    if ours(trial) and not Path("died").exists():
+        Path("died").touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return numbers(trial, report)
+
+def dies_always(trial, report):
+    if ours(trial):
+        os.kill(os.getpid(), signal.SIGKILL)
+    return numbers(trial, report)
+
+def fails(trial, report):
+    if ours(trial):
+        raise RuntimeError("on purpose")
+    return numbers(trial, report)
+"""
+
+
+class Answer(NamedTuple):
+    code: int
+    out: str
+    err: str
+
+
+Call = Callable[..., Answer]
+
+
+@pytest.fixture
+def call(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Call:
+    """Runs `proxcgal campaign static` in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: str | Path) -> Answer:
+        code = cli.main(["campaign", "static", *map(str, arguments)])
+        return Answer(code, *capsys.readouterr())
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A small campaign that ran in one process, uninterrupted."""
+    folder = tmp_path_factory.mktemp("campaign") / "whole"
+    arguments = ["campaign", "static", *SMALL, "--workers", "1", "--keep", "worst:1", "--quiet"]
+    assert cli.main([*arguments, "--out", str(folder)]) == 0
+    return folder
+
+
+@pytest.fixture(scope="session")
+def planned() -> Campaign:
+    return static.plan(WISHES)
+
+
+@pytest.fixture
+def performs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    """What may be done with a trial, in a module that worker processes can import."""
+    (tmp_path / "performs.py").write_text(PERFORM)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    import performs  # type: ignore[import-not-found]
+
+    return performs
+
+
+def summary(folder: Path) -> bytes:
+    return (folder / "summary.json").read_bytes()
+
+
+def trial_files(folder: Path) -> dict[str, int]:
+    """When each finished trial was written."""
+    return {path.name: path.stat().st_mtime_ns for path in (folder / "trials").glob("*.json")}
+
+
+def wait_until(true: Callable[[], bool], patience: float = 120.0) -> None:
+    end = time.monotonic() + patience
+    while not true():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+# --- Interruptions
+
+
+def test_after_a_kill_of_everything_no_finished_trial_is_repeated(
+    call: Call, whole: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "killed"
+    arguments = [*PROGRAM, "campaign", "static", *SMALL, "--workers", "2", "--keep", "worst:1"]
+    program = subprocess.Popen(
+        [*arguments, "--out", folder], stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    wait_until(lambda: len(trial_files(folder)) >= 2)
+    os.kill(program.pid, signal.SIGKILL)
+    program.communicate()
+    before = trial_files(folder)
+    assert 2 <= len(before) < 6
+    answer = call(*SMALL, "--workers", "1", "--keep", "worst:1", "--out", folder)
+    assert answer.code == 0
+    after = trial_files(folder)
+    assert len(after) == 6
+    assert {name: after[name] for name in before} == before
+    assert " of 6: front_plane-1-wb_known: " in answer.err
+    assert answer.err.count(" of 6: ") == 6 - len(before)
+    assert summary(folder) == summary(whole)
+    wait_until(lambda: not members(program.pid), 90.0)
+
+
+def members(session: int) -> list[str]:
+    """Processes that are left of a program that was started as a session of its own."""
+    found = []
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = stat.read_text().rpartition(")")[2].split()
+        except OSError:  # it ended meanwhile
+            continue
+        if int(fields[3]) == session and fields[0] != "Z":
+            found.append(stat.parent.name)
+    return found
+
+
+def test_ctrl_c_tells_what_is_kept_and_how_to_go_on(tmp_path: Path) -> None:
+    program = subprocess.Popen(
+        [*PROGRAM, "campaign", "static", *SMALL[:-1], "duration=2.0", "--workers", "2", "--quiet"],
+        cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
+    folder = tmp_path / "out" / "campaign-static"
+    wait_until(lambda: len(trial_files(folder)) >= 1)
+    os.killpg(program.pid, signal.SIGINT)
+    out, err = program.communicate(timeout=60)
+    assert program.returncode == 130
+    assert out == ""
+    kept = len(trial_files(folder))
+    assert err == (
+        f"proxcgal: interrupted; {kept} of 6 trials are kept in out/campaign-static; the same "
+        "command goes on from there\n"
+    )
+    wait_until(lambda: not members(program.pid))
+
+
+def test_a_trial_whose_worker_was_killed_is_run_again(
+    performs: ModuleType, planned: Campaign, tmp_path: Path
+) -> None:
+    campaign = replace(planned, perform=performs.dies_once, columns=["number"])
+    with Pool(2) as pool, Store(tmp_path / "store", {}) as store:
+        ended = run_campaign(campaign, store, pool)
+    assert (tmp_path / "died").exists()
+    assert [each.outcome.error for each in ended] == [None] * 6
+    with Pool(1) as pool, Store(tmp_path / "other", {}) as store:
+        alone = run_campaign(replace(campaign, perform=performs.numbers), store, pool)
+    assert [each.outcome.row for each in ended] == [each.outcome.row for each in alone]
+
+
+@pytest.mark.parametrize(
+    ("perform", "error"),
+    [("fails", "RuntimeError: on purpose (performs.py:"), ("dies_always", "worker process died")],
+)
+def test_a_trial_that_fails_stops_no_other(
+    performs: ModuleType, planned: Campaign, tmp_path: Path, perform: str, error: str
+) -> None:
+    campaign = replace(planned, perform=getattr(performs, perform), columns=["number"])
+    with Pool(2) as pool, Store(tmp_path / "store", {}) as store:
+        ended = run_campaign(campaign, store, pool)
+        left = unfinished(campaign, store)
+    failed = [each for each in ended if each.outcome.row is None]
+    assert [each.trial.name for each in failed] == ["front_plane-0-sm"]
+    assert error in (failed[0].outcome.error or "")
+    assert left == [failed[0].trial]
+
+
+def test_a_failed_trial_is_told_with_what_repeats_it(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = static.simulate
+
+    def simulate(scenario: object, controller: str, *rest: object) -> object:
+        if controller == "sm":
+            raise px.SimulationError("MuJoCo warned")
+        return real(scenario, controller, *rest)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(static, "simulate", simulate)
+    answer = call(*ONE, "--keep", "none", "--out", "here")
+    assert answer.code == 1
+    command = answer.err.splitlines()[-1].removeprefix("proxcgal:").strip()
+    assert answer.err.startswith("proxcgal: front_plane-0-sm: failed: MuJoCo warned\n")
+    assert command.startswith("proxcgal run front_plane --controller sm --seed 0 --set duration=0")
+    told = json.loads(summary(Path("here")))
+    assert told["failed"] == [
+        {"name": "front_plane-0-sm", "error": "MuJoCo warned", "command": command}
+    ]
+    assert told["scenes"]["front_plane"]["controllers"]["wb"]["trials"] == 1
+
+
+def test_a_campaign_of_which_every_trial_fails_still_tells_so(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def simulate(*_: object) -> object:
+        raise px.SimulationError("MuJoCo warned")
+
+    monkeypatch.setattr(static, "simulate", simulate)
+    answer = call(*ONE, "--out", "here")
+    assert answer.code == 1
+    assert answer.err.count(": failed: MuJoCo warned\n") == 3
+    assert json.loads(summary(Path("here")))["scenes"]["front_plane"]["gain_mm"] is None
+
+
+# --- The same on any number of workers, in any order, on a cluster
+
+
+def test_two_workers_give_the_summary_of_one(call: Call, whole: Path, tmp_path: Path) -> None:
+    arguments = (*SMALL, "--workers", "2", "--keep", "worst:1", "--quiet", "--out", "two")
+    assert call(*arguments).code == 0
+    assert summary(tmp_path / "two") == summary(whole)
+
+
+def test_order_changes_no_number(call: Call, planned: Campaign, whole: Path) -> None:
+    shuffled = list(planned.trials)
+    random.Random(1).shuffle(shuffled)
+    there = json.loads((whole / "campaign.json").read_text())
+    with Pool(1) as pool, Store(Path("here"), there) as store:
+        run_campaign(replace(planned, trials=shuffled), store, pool)
+    again = (*SMALL, "--workers", "1", "--keep", "worst:1", "--quiet", "--out", "here")
+    assert call(*again).code == 0
+    assert summary(Path("here")) == summary(whole)
+
+
+@pytest.fixture
+def cluster() -> Iterator[object]:
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+    ) as cluster:
+        yield cluster
+
+
+def test_a_cluster_that_loses_a_worker_gives_the_summary_of_one_process(
+    call: Call, whole: Path, cluster: object, tmp_path: Path
+) -> None:
+    folder = tmp_path / "far"
+    nanny = next(iter(cluster.workers.values()))  # type: ignore[attr-defined]
+    first = nanny.pid
+
+    def kill() -> None:
+        wait_until(lambda: len(trial_files(folder)) >= 1)
+        os.kill(first, signal.SIGKILL)
+
+    killer = threading.Thread(target=kill)
+    killer.start()
+    address = cluster.scheduler_address  # type: ignore[attr-defined]
+    answer = call(*SMALL, "--cluster", address, "--keep", "worst:1", "--quiet", "--out", folder)
+    killer.join()
+    assert answer.code == 0
+    assert summary(folder) == summary(whole)
+    wait_until(lambda: nanny.pid not in (None, first))
+
+
+# --- What is written
+
+
+def test_the_table_has_a_row_a_trial(whole: Path) -> None:
+    table = pl.read_parquet(whole / "trials.parquet")
+    assert table.shape[0] == 6
+    assert table["key"].n_unique() == 6
+    assert table["controller"].to_list() == ["wb", "sm", "wb_known"] * 2
+    for row in table.iter_rows(named=True):
+        scenario = load_scenario("front_plane", shlex.split(row["command"])[8:])
+        assert scenario.obstacles[0].position[0] == row["panel_x_m"]
+        assert scenario.q0[5] == row["q0_5"]
+
+
+def test_the_command_beside_a_recording_repeats_it(
+    whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    entry = json.loads(summary(whole))["worst"][0]
+    table = pl.read_parquet(whole / "trials.parquet").filter(pl.col("name") == entry["name"])
+    words = shlex.split(entry["command"])
+    assert words[0] == "proxcgal"
+    assert cli.main([*words[1:], "--no-picture", "--quiet", "--out", "again"]) == 0
+    again = json.loads(Path("again/summary.json").read_text())["controllers"]["wb"]
+    for key, value in again.items():
+        assert value == table[key][0]
+
+
+def test_a_kept_recording_holds_the_ticks_with_scans_and_cannot_be_computed_again(
+    whole: Path,
+) -> None:
+    entry = json.loads(summary(whole))["worst"][0]
+    recording = read_recording(whole / entry["recording"])
+    assert recording.damage is None
+    assert recording.settings.ticks == "scans"
+    assert [tick.given.time for tick in recording.ticks] == pytest.approx([0.0, 0.07, 0.14])
+    assert all(len(tick.given.scans) == 30 for tick in recording.ticks)
+    with pytest.raises(px.ConfigError, match="every tick only"):
+        first_difference(recording)
+
+
+def test_every_tick_is_kept_where_asked_for(call: Call, whole: Path) -> None:
+    assert call(*ONE, "--keep", "worst:1", "--every-tick", "--out", "here").code == 0
+    recording = read_recording(next(Path("here/recordings").iterdir()))
+    assert len(recording.ticks) == 20
+    assert first_difference(recording) is None
+
+
+def test_more_runs_go_on_where_fewer_ended(call: Call, whole: Path) -> None:
+    assert call(*ONE, "--keep", "none", "--out", "here").code == 0
+    before = trial_files(Path("here"))
+    assert len(before) == 3
+    more = (*SMALL, "--workers", "1", "--keep", "worst:1", "--quiet", "--out", "here")
+    assert call(*more).code == 0
+    after = trial_files(Path("here"))
+    assert {name: after[name] for name in before} == before
+    assert summary(Path("here")) == summary(whole)
+
+
+def test_a_report_is_made_again_from_the_folder(whole: Path) -> None:
+    before = (whole / "report.html").read_bytes()
+    assert cli.main(["report", str(whole)]) == 0
+    assert (whole / "report.html").read_bytes() == before
+    assert before.count(b"<img ") == 1
+
+
+def test_a_half_written_trial_is_none(planned: Campaign, tmp_path: Path) -> None:
+    key = planned.trials[0].key
+    with Store(tmp_path, {}) as store:
+        store.put(Outcome(key=key, row={"number": 1}))
+        assert store.outcomes([key])[key].row == {"number": 1}
+        file = tmp_path / "trials" / f"{key}.json"
+        file.write_bytes(file.read_bytes()[:-9])
+        assert store.outcomes([key]) == {}
+
+
+# --- Bad input
+
+
+@pytest.mark.parametrize(
+    ("arguments", "lines"),
+    [
+        (["--runs", "0"], ["--runs 0: must be 1 or more"]),
+        (
+            ["--keep", "best:3", "--seed", "-1"],
+            [
+                "--keep best:3: must be worst:N, such as worst:5, or none",
+                "--seed -1: must be 0 or more",
+            ],
+        ),
+        (["--workers", "0"], ["--workers 0: must be 1 or more"]),
+        (["--set", "seed=3"], ["--set seed=...: every draw has its own; --seed fixes them all"]),
+        (["--set", "obstacle=[]"], ["scenario front_plane: scenes can be drawn round one with "]),
+        (["--set", "duration=-1"], ["front_plane.toml: override duration = -1: must be greater "]),
+        (["--scenario", "nowhere"], ["scenario 'nowhere': No such file or directory; a path to "]),
+        (
+            ["--scenario", "front_plane", "front_plane"],
+            ["--scenario front_plane: there is another one named front_plane"],
+        ),
+        (["--cluster", "tcp://127.0.0.1:1"], ["--cluster tcp://127.0.0.1:1: no scheduler answers"]),
+        (["--cluster", "what"], ["--cluster what: no scheduler answers there: "]),
+        (["--set", "q0=[0,0]"], ["scenario front_plane: q0 has 2 values: ur10e has 6 joints"]),
+    ],
+)
+def test_bad_input_is_told_in_a_line_a_problem_and_nothing_is_written(
+    call: Call,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    lines: list[str],
+) -> None:
+    monkeypatch.setattr("proxcgal.study.cluster.CONNECT_S", 0.5)
+    answer = call("--runs", "1", *arguments)
+    assert answer.code == 2
+    told = answer.err.splitlines()
+    assert len(told) == len(lines)
+    for line, expected in zip(told, lines, strict=True):
+        assert line.startswith("proxcgal: ")
+        assert expected in line
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_another_campaigns_folder_is_refused(call: Call, whole: Path) -> None:
+    before = trial_files(whole)
+    answer = call(*SMALL, "--seed", "3", "--out", whole)
+    assert answer.code == 2
+    assert answer.err.splitlines()[-1] == (
+        f"proxcgal: --out {whole}: holds another campaign: seed is 0 there and 3 here; name "
+        "another folder, or remove that one"
+    )
+    assert trial_files(whole) == before
+
+
+def test_two_processes_do_not_work_in_one_folder(call: Call, whole: Path) -> None:
+    description = json.loads((whole / "campaign.json").read_text())
+    with Store(whole, description):
+        answer = call(*SMALL, "--quiet", "--out", whole)
+    assert answer.code == 2
+    assert "another process is at work on this campaign" in answer.err
+
+
+# --- Draws and intervals
+
+
+def test_draws_meet_what_is_promised_of_them() -> None:
+    base = load_scenario("front_plane")
+    robot = px.load_robot("ur10e")
+    redrawn = 0
+    for number in range(12):
+        draw = draw_scene(base, robot, 7, number)
+        redrawn += draw.redrawn.total()
+        scenario, panel = draw.scenario, draw.scenario.obstacles[0]
+        distance, _, own = Truth(robot, scenario.obstacles)(np.array(scenario.q0))
+        assert distance >= 0.3
+        assert own >= 0.03
+        np.testing.assert_array_less(
+            np.abs(np.subtract(panel.position, base.obstacles[0].position)), 0.1001
+        )
+        assert np.abs(panel.rpy).max() < 0.2601
+        assert np.abs(np.subtract(scenario.q0, base.q0)).max() < 0.2001
+        again = draw_scene(base, robot, 7, number)
+        assert again.overrides == draw.overrides
+    assert redrawn > 0
+
+
+def test_a_goal_is_within_reach_where_a_posture_reaches_it() -> None:
+    robot = px.load_robot("ur10e")
+    q0 = np.array(load_scenario("front_plane").q0)
+    generator = np.random.default_rng(5)
+    for _ in range(5):
+        assert reachable(robot, q0, robot.tool_pose(q0 + generator.uniform(-0.6, 0.6, 6)))
+    far = np.array(robot.tool_pose(q0))
+    far[:3, 3] = (1.5, 0.0, 0.6)
+    assert not reachable(robot, q0, far)
+
+
+def test_a_line_crosses_a_plate_or_passes_it() -> None:
+    T_WO = np.eye(4)
+    T_WO[:3, 3] = (1.0, 0.0, 0.0)
+    size = (0.02, 1.0, 1.0)
+    crossing = np.array([0.0, 0.0, 0.0]), np.array([2.0, 0.8, 0.0])
+    passing = np.array([0.0, 0.0, 0.0]), np.array([2.0, 1.2, 0.0])
+    before = np.array([0.0, 0.0, 0.0]), np.array([0.9, 0.0, 0.0])
+    assert crosses(size, T_WO, *crossing)
+    assert not crosses(size, T_WO, *passing)
+    assert not crosses(size, T_WO, *before)
+
+
+def test_the_medians_interval_is_that_of_scipy() -> None:
+    values = np.random.default_rng(4).normal(100.0, 30.0, 80).tolist()
+    interval = median_interval(values)
+    assert interval is not None
+    assert interval.median == np.median(values)
+    oracle = stats.bootstrap(
+        (values,), np.median, method="percentile", n_resamples=10_000, rng=1
+    ).confidence_interval
+    assert interval.low == pytest.approx(oracle.low, abs=2.0)
+    assert interval.high == pytest.approx(oracle.high, abs=2.0)
+    assert median_interval([]) is None
+
+
+def test_a_key_belongs_to_what_a_trial_is_and_not_to_where_it_stands(planned: Campaign) -> None:
+    trial = planned.trials[0]
+    assert replace(trial, tags={"draw": 9}, source="elsewhere").key == trial.key
+    other = [
+        replace(trial, seed=1), replace(trial, controller="sm"), planned.trials[3],
+        replace(trial, scenario=load_scenario("front_plane")),
+    ]  # fmt: skip
+    assert len({trial.key, *(each.key for each in other)}) == 5
+
+
+def test_names_of_trials_lead_nowhere(planned: Campaign) -> None:
+    trial: Trial = replace(planned.trials[0], tags={"scene": "../../etc/x", "draw": 0})
+    assert "/" not in trial.name
+    assert not trial.name.startswith(".")
