@@ -19,6 +19,7 @@ from proxcgal.sim.replay import Replay, recorded_log
 from proxcgal.sim.scenario import load_scenario
 from proxcgal.sim.scenario_keys import Fault
 from proxcgal.sim.setup import Setup
+from proxcgal.sim.ticks import TickInput
 from proxcgal.sim.trial import TrialLog, first_difference, recompute, run_trial
 
 SHORT = ["duration=1.0"]
@@ -240,8 +241,12 @@ def through(fault: Fault, until: int = 12) -> Iterator[tuple[int, dict[int, px.S
     """Scans 0, 1, 2, ... every 0.1 s through one fault, by sensor; the fault is from 0.3 to 0.6."""
     injector = FaultInjector([fault], NAMES, seed=1)
     for counter in range(until):
-        out = injector(0.1 * counter, made_scans(0.1 * counter, counter))
-        yield counter, {scan.sensor: scan for scan in out}
+        yield counter, {scan.sensor: scan for scan in injector(made_input(counter)).scans}
+
+
+def made_input(counter: int) -> TickInput:
+    time = 0.1 * counter
+    return TickInput(time, np.zeros(6), np.eye(4), tuple(made_scans(time, counter)))
 
 
 def injected(kind: str, **more: object) -> Fault:
@@ -283,12 +288,42 @@ def test_a_stuck_payload_comes_with_advancing_counters() -> None:
         np.testing.assert_array_equal(scan.ranges[1:], 0.502)
 
 
-@pytest.mark.parametrize(("kind", "value"), [("nan", np.nan), ("zero", 0.0)])
+@pytest.mark.parametrize(
+    ("kind", "value"), [("nan", np.nan), ("infinite", np.inf), ("negative", -0.1), ("zero", 0.0)]
+)
 def test_bad_ranges_come_with_a_valid_status(kind: str, value: float) -> None:
     for scan in faulty(injected(kind)).values():
         assert scan is not None
         np.testing.assert_array_equal(scan.ranges, value)
         assert (scan.status == VALID).all()
+
+
+def test_a_wrong_stamp_and_a_status_code_come_as_they_were_asked_for() -> None:
+    for counter, scan in faulty(injected("stamp_offset", value=-0.04)).items():
+        assert scan is not None
+        assert scan.stamp == pytest.approx(0.1 * counter - 0.04)
+    for scan in faulty(injected("status", value=13)).values():
+        assert scan is not None
+        assert (scan.status == 13).all()
+
+
+def test_a_duplicate_is_the_same_scan_twice() -> None:
+    out = FaultInjector([injected("duplicate")], NAMES, seed=1)(made_input(3))
+    assert [scan.counter for scan in out.scans if scan.sensor == 2] == [3, 3]
+
+
+def test_faults_of_other_inputs_go_by_the_time_of_the_tick() -> None:
+    at = {
+        kind: FaultInjector([injected(kind)], NAMES, seed=1)
+        for kind in ("joints_old", "clock_jump", "late")
+    }
+    assert at["joints_old"](made_input(3)).q_stamp == pytest.approx(0.25)
+    assert at["joints_old"](made_input(6)).q_stamp is None
+    assert at["late"](made_input(3)).late
+    jumped = at["clock_jump"](made_input(3))
+    assert jumped.time == pytest.approx(3600.3)
+    assert jumped.scans[0].stamp == pytest.approx(3600.3)
+    assert at["clock_jump"](made_input(6)).time == pytest.approx(0.6)
 
 
 def test_dropout_loses_the_share_asked_for_and_the_same_zones_with_a_seed() -> None:

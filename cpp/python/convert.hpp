@@ -86,8 +86,9 @@ inline void require_finite(const Eigen::Ref<const Points>& points, const char* n
     return;
   for (Eigen::Index i = 0; i < points.rows(); ++i) {
     if (!points.row(i).allFinite() || points.row(i).cwiseAbs().maxCoeff() > farthest) {
-      throw GeometryError(std::string(name) + " row " + std::to_string(i) +
-                          " is not finite or farther than 1e9 m: every coordinate must be finite [m]");
+      throw GeometryError(
+          std::string(name) + " row " + std::to_string(i) +
+          " is not finite or farther than 1e9 m: every coordinate must be finite [m]");
     }
   }
 }

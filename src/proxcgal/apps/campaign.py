@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from proxcgal.study.store import Outcome, Store
 
 #: Module that holds each kind as its `KIND`.
-KINDS = {"static": "proxcgal.study.static"}
+KINDS = {"static": "proxcgal.study.static", "faults": "proxcgal.study.faults"}
 
 
 @dataclass(frozen=True)
@@ -34,6 +34,8 @@ class CampaignOptions:
 
     static: panels, start postures and goals drawn at random round the static scenes, every draw
     with all controllers.
+    faults: every fault of docs/reliability.md while the arm moves, on two robots: is the mode
+    right, how soon, does the arm recover?
 
     Every finished trial is kept at once: the same command goes on where it was interrupted, and
     more --runs go on where fewer ended. Writes trials.parquet (a row a trial), summary.json,
@@ -42,19 +44,22 @@ class CampaignOptions:
     Examples:
       proxcgal campaign static --runs 100
       proxcgal campaign static --runs 20 --set controller.d_min=0.25 --out out/farther
+      proxcgal campaign faults --runs 20
       proxcgal campaign static --runs 1000 --cluster tcp://10.0.0.1:8786
     """
 
-    kind: Annotated[Literal["static"], tyro.conf.Positional, tyro.conf.arg(metavar="static")]
+    kind: Annotated[
+        Literal["static", "faults"], tyro.conf.Positional, tyro.conf.arg(metavar="static|faults")
+    ]
     """What is repeated."""
     runs: Annotated[int, tyro.conf.arg(metavar="N")] = 100
-    """Draws of each scene."""
+    """Draws of each scene, or runs of each fault and robot."""
     seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
     """Fixes every random draw."""
     scenario: Annotated[
         tuple[str, ...], tyro.conf.arg(metavar="NAME|PATH ...", help_behavior_hint="")
     ] = ()
-    """Scenes to draw round, instead of front_plane and side_plane."""
+    """Scenes instead of the kind's own."""
     set: Settings = ()
     """Change keys of all scenarios, values as in TOML: controller.d_min=0.25"""
     workers: Number = None

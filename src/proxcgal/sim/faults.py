@@ -1,21 +1,26 @@
-"""Faults put between the sensors and the controller, as the scenario's `[[fault]]` tables say."""
+"""Faults put between the world and the controller, as the scenario's `[[fault]]` tables say."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from proxcgal import _core
 from proxcgal.errors import ConfigError
 from proxcgal.sim.ranges import NO_TARGET, VALID, ZONES
-from proxcgal.sim.scenario_keys import FAULT_VALUES, Fault
+from proxcgal.sim.scenario_keys import FAULT_VALUES, INPUT_FAULTS, Fault
+from proxcgal.sim.ticks import TickInput
 
 _STREAM = 2  # of the seed; the sensors' noise draws from another
 
 
 class FaultInjector:
-    """Applies every fault, in the file's order, to the scans of one tick after another."""
+    """Applies every fault, in the file's order, to one tick's inputs after another.
+
+    Faults of scans go by the scans' stamps, the others by the tick's time.
+    """
 
     def __init__(self, faults: Sequence[Fault], sensors: Sequence[str], seed: int) -> None:
         """Resolves sensors by row, name or "all".
@@ -30,7 +35,10 @@ class FaultInjector:
         """
         problems = []
         self._faults: list[_Injected] = []
+        self._inputs: list[Fault] = [fault for fault in faults if fault.kind in INPUT_FAULTS]
         for place, fault in enumerate(faults):
+            if fault.kind in INPUT_FAULTS:
+                continue
             rows = _rows(fault.sensor, sensors)
             if rows is None:
                 problems.append(
@@ -42,11 +50,33 @@ class FaultInjector:
         if problems:
             raise ConfigError("\n".join(problems))
 
-    def __call__(self, time: float, scans: Sequence[_core.Scan]) -> list[_core.Scan]:
-        """What the controller gets instead of `scans` at `time` [s]."""
+    def __call__(self, given: TickInput) -> TickInput:
+        """What the controller gets instead of a tick's inputs."""
+        scans: Sequence[_core.Scan] = given.scans
         for fault in self._faults:
-            scans = fault.apply(time, scans)
-        return list(scans)
+            scans = fault.apply(given.time, scans)
+        given = replace(given, scans=tuple(scans))
+        for fault in self._inputs:
+            given = _spoiled_input(fault, given)
+        return given
+
+
+def _spoiled_input(fault: Fault, given: TickInput) -> TickInput:
+    end = np.inf if fault.end is None else fault.end
+    usual = FAULT_VALUES.get(fault.kind, ("", 0.0))[1]
+    value = usual if fault.value is None else fault.value
+    if fault.kind == "clock_jump":  # a clock that jumped stays so: `to` jumps back
+        shift = value if fault.start <= given.time < end else 0.0
+        scans = tuple(
+            _core.Scan(scan.sensor, scan.counter, scan.stamp + shift, scan.ranges, scan.status)
+            for scan in given.scans
+        )
+        return replace(given, time=given.time + shift, scans=scans if shift else given.scans)
+    if not fault.start <= given.time < end:
+        return given
+    if fault.kind == "joints_old":
+        return replace(given, q_stamp=given.time - value)
+    return replace(given, late=True)
 
 
 class _Injected:
@@ -73,12 +103,15 @@ class _Injected:
                 self._waiting.append(scan)
             elif self._kind != "silent":
                 out.append(self._spoil(scan))
+                if self._kind == "duplicate":
+                    out.append(out[-1])
         due = [scan for scan in self._waiting if scan.stamp + self._value <= time]
         self._waiting = [scan for scan in self._waiting if scan.stamp + self._value > time]
         return out + due
 
     def _spoil(self, scan: _core.Scan) -> _core.Scan:
-        counter, ranges, status = scan.counter, np.array(scan.ranges), np.array(scan.status)
+        counter, stamp = scan.counter, scan.stamp
+        ranges, status = np.array(scan.ranges), np.array(scan.status)
         match self._kind:
             case "frozen" | "stuck_payload":
                 last = self._last.setdefault(scan.sensor, scan)
@@ -87,15 +120,23 @@ class _Injected:
                     counter = last.counter
             case "nan":
                 ranges[:], status[:] = np.nan, VALID
+            case "infinite":
+                ranges[:], status[:] = np.inf, VALID
+            case "negative":
+                ranges[:], status[:] = -0.1, VALID
             case "zero":
                 ranges[:], status[:] = 0.0, VALID
+            case "status":
+                status[:] = int(self._value)
+            case "stamp_offset":
+                stamp += self._value
             case "dropout":
                 generator = np.random.default_rng([*self._key, scan.sensor, scan.counter])
                 lost = generator.random(ZONES) < self._value
                 ranges[lost], status[lost] = 0.0, NO_TARGET
             case "offset":
                 ranges[status != NO_TARGET] += self._value
-        return _core.Scan(scan.sensor, counter, scan.stamp, ranges, status)
+        return _core.Scan(scan.sensor, counter, stamp, ranges, status)
 
 
 def _rows(sensor: int | str, names: Sequence[str]) -> frozenset[int] | None:

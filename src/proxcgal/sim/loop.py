@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,13 +31,13 @@ def run_ticks(
     points = np.empty((0, 3)) if known_points_W is None else known_points_W
     while (given := source.read()) is not None:
         if faults is not None:
-            given = replace(given, scans=tuple(faults(given.time, given.scans)))
+            given = faults(given)
         scans = list(given.scans)
         start = clock.perf_counter_ns()
         if given.known:
             out = law.tick_known(given.time, given.q, points, given.goal)
         else:
-            out = law.tick(given.time, given.q, scans, given.goal, given.late)
+            out = law.tick(given.time, given.q, scans, given.goal, given.late, given.q_stamp)
         tick_us = (clock.perf_counter_ns() - start) / 1000.0
         result = TickResult.of(out, len(law.cloud_origins()), tick_us)
         source.command(result.qd)

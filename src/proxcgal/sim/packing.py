@@ -40,6 +40,7 @@ def encode(tick: Tick, before: int) -> bytes:
         "goal": given.goal.ravel().tolist(),
         "known": given.known,
         "late": given.late,
+        "q_stamp": given.q_stamp,
         "scans": base64.b64encode(pack_scans(given.scans)).decode(),
         "qd": result.qd.tolist(),
         "mode": result.mode,
@@ -88,6 +89,7 @@ def decode(data: bytes) -> tuple[Tick, int]:
         scans=unpack_scans(base64.b64decode(content["scans"])),
         known=content["known"],
         late=content["late"],
+        q_stamp=None if (stamp := content.get("q_stamp")) is None else float(stamp),
     )
     result = TickResult(
         qd=_array(content["qd"]),

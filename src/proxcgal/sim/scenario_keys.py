@@ -17,13 +17,34 @@ from proxcgal import _core
 from proxcgal.sim import boxes
 
 FaultKind = Literal[
-    "silent", "frozen", "stuck_payload", "nan", "zero", "dropout", "offset", "delay"
+    "silent",
+    "frozen",
+    "stuck_payload",
+    "nan",
+    "infinite",
+    "negative",
+    "zero",
+    "status",
+    "dropout",
+    "offset",
+    "delay",
+    "duplicate",
+    "stamp_offset",
+    "joints_old",
+    "clock_jump",
+    "late",
 ]
+#: Those of the tick's other inputs; `sensor` says nothing there.
+INPUT_FAULTS = ("joints_old", "clock_jump", "late")
 #: What `value` means to a fault, and what it is where the file leaves it out; others take none.
 FAULT_VALUES: dict[str, tuple[str, float]] = {
     "dropout": ("share of zones lost, 0 to 1", 0.5),
     "offset": ("added to every range [m]", 0.05),
     "delay": ("scans arrive this much later [s]", 0.1),
+    "status": ("every zone's status code, 0 to 255", 4.0),
+    "stamp_offset": ("added to every scan's stamp [s]", 0.03),
+    "joints_old": ("age of the joint state [s]", 0.05),
+    "clock_jump": ("the caller's clock goes on from this much later, or earlier [s]", 3600.0),
 }
 
 
@@ -180,7 +201,9 @@ class Fault(Section):
     end: Positive | None = Field(
         None, alias="to", description="[s] stamps from here on are fine again; left out: never"
     )
-    value: float | None = Field(None, description="dropout: share; offset: [m]; delay: [s]")
+    value: float | None = Field(
+        None, description="of the kind, in its unit; the table below has them"
+    )
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -192,6 +215,10 @@ class Fault(Section):
             raise ValueError("value must be a share between 0 and 1")
         if self.kind == "delay" and (self.value or 0.0) < 0.0:
             raise ValueError("value must be a time of at least 0 s")
+        if self.kind == "joints_old" and (self.value or 0.0) < 0.0:
+            raise ValueError("value must be an age of at least 0 s")
+        if self.kind == "status" and (self.value or 0.0) not in range(256):
+            raise ValueError("value must be a whole number from 0 to 255")
         return self
 
 

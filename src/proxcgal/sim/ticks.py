@@ -25,6 +25,7 @@ class TickInput:
     scans: tuple[_core.Scan, ...] = ()  #: since the last tick
     known: bool = False  #: the scene's own points are given instead of scans
     late: bool = False  #: the caller missed its deadline
+    q_stamp: float | None = None  #: [s] when q was measured; None: just now
 
 
 @dataclass(frozen=True, slots=True)

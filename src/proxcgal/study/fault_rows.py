@@ -1,0 +1,96 @@
+"""The faults that a campaign puts in, row by row, and what must happen then."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+RUN, DEGRADED, HOLD, STOP = range(4)
+MODES = ("RUN", "DEGRADED", "HOLD", "STOP")
+SENSORS = 10  # of the array that a fault hits
+
+Fault = dict[str, object]  # a `[[fault]]` table, but for its times
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """One fault and the required behaviour."""
+
+    name: str
+    faults: Callable[[int], Sequence[Fault]]  # of the sensor that is hit
+    least: int  # mode that must be reached
+    most: int  # mode that must not be exceeded
+    within: float  # [s] from the fault's onset
+    finding: str = ""  # that must be told
+    same_commands: bool = False  # as without the fault, to the bit
+    duration: float = 1.0  # [s] of the fault
+
+
+def one(kind: str, value: float | None = None) -> Callable[[int], Sequence[Fault]]:
+    """A fault of one sensor, or of an input that has none."""
+
+    def faults(sensor: int) -> Sequence[Fault]:
+        fault: Fault = {"kind": kind, "sensor": sensor}
+        return [fault if value is None else fault | {"value": value}]
+
+    return faults
+
+
+def array(kind: str) -> Callable[[int], Sequence[Fault]]:
+    """The same fault of every sensor of the array that the sensor belongs to."""
+
+    def faults(sensor: int) -> Sequence[Fault]:
+        first = sensor - sensor % SENSORS
+        return [{"kind": kind, "sensor": row} for row in range(first, first + SENSORS)]
+
+    return faults
+
+
+def every(kind: str) -> Callable[[int], Sequence[Fault]]:
+    """The fault of all sensors."""
+    return lambda _: [{"kind": kind, "sensor": "all"}]
+
+
+#: A silent sensor degrades; where the arm moves into what it covered, it holds.
+_BLIND = {"least": DEGRADED, "most": HOLD, "within": 0.15, "finding": "sensor_silent"}
+
+ROWS: tuple[Row, ...] = (
+    Row(name="sensor silent", faults=one("silent"), **_BLIND),  # type: ignore[arg-type]
+    Row(name="array silent", faults=array("silent"), least=HOLD, most=HOLD, within=0.2,
+        finding="array_silent"),
+    Row(name="all silent", faults=every("silent"), least=HOLD, most=HOLD, within=0.2,
+        finding="all_sensors_silent"),
+    Row(name="frozen frames", faults=one("frozen"), **_BLIND),  # type: ignore[arg-type]
+    # Five scans of 15 Hz, and the one that is repeated.
+    Row(name="same payload", faults=one("stuck_payload"), least=DEGRADED, most=HOLD, within=0.45,
+        finding="sensor_suspect"),
+    *(
+        Row(name=f"range {kind}", faults=one(kind), **_BLIND)  # type: ignore[arg-type]
+        for kind in ("nan", "infinite", "negative", "zero")
+    ),
+    Row(name="status 4", faults=one("status", 4.0), **_BLIND),  # type: ignore[arg-type]
+    Row(name="status 200 (unknown)", faults=one("status", 200.0), **_BLIND),  # type: ignore[arg-type]
+    Row(name="status 6", faults=one("status", 6.0), least=RUN, most=RUN, within=0.0),
+    Row(name="status 9", faults=one("status", 9.0), least=RUN, most=RUN, within=0.0),
+    Row(name="status 255 (no target)", faults=one("status", 255.0), least=RUN, most=RUN,
+        within=0.0),
+    Row(name="scans twice", faults=one("duplicate"), least=RUN, most=RUN, within=0.0,
+        finding="scan_refused", same_commands=True),
+    Row(name="stamps of the future", faults=one("stamp_offset", 1.0), **_BLIND),  # type: ignore[arg-type]
+    Row(name="stamps of long ago", faults=one("stamp_offset", -1.0), **_BLIND),  # type: ignore[arg-type]
+    Row(name="stamps 30 ms late", faults=one("stamp_offset", -0.03), least=RUN, most=RUN,
+        within=0.0),
+    Row(name="scans arrive 0.3 s late", faults=one("delay", 0.3), **_BLIND),  # type: ignore[arg-type]
+    Row(name="clock an hour ahead", faults=one("clock_jump", 3600.0), least=RUN, most=RUN,
+        within=0.0, finding="time_invalid", same_commands=True),
+    Row(name="clock an hour back", faults=one("clock_jump", -3600.0), least=RUN, most=RUN,
+        within=0.0, finding="time_invalid", same_commands=True),
+    Row(name="joint state 50 ms old", faults=one("joints_old", 0.05), least=HOLD, most=HOLD,
+        within=0.02, finding="joint_state_stale"),
+    Row(name="joint state 150 ms old", faults=one("joints_old", 0.15), least=STOP, most=STOP,
+        within=0.02, finding="joint_state_lost"),
+    Row(name="one deadline missed", faults=one("late"), least=RUN, most=RUN, within=0.0,
+        finding="deadline_missed", duration=0.01),
+    Row(name="deadlines missed", faults=one("late"), least=HOLD, most=HOLD, within=0.04,
+        finding="deadlines_missed"),
+)  # fmt: skip

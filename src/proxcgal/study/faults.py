@@ -1,0 +1,248 @@
+"""Faults put into running trials: is the mode right, how soon, and does the arm recover?"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import polars as pl
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from proxcgal.errors import ConfigError
+from proxcgal.sim.scenario import load_scenario
+from proxcgal.sim.setup import Setup
+from proxcgal.study.analysis import Summary
+from proxcgal.study.campaign import Campaign, Trial
+from proxcgal.study.fault_rows import DEGRADED, HOLD, MODES, ROWS, RUN, STOP, Row
+from proxcgal.study.figures import DPI, GREY
+from proxcgal.study.kind import Kind, Listing, Wishes
+from proxcgal.study.trials import robot_of, simulate
+
+if TYPE_CHECKING:
+    from proxcgal.sim.trial import TrialLog
+    from proxcgal.study.jobs import Report
+    from proxcgal.study.store import Row as Numbers
+
+#: Scenes in which the arm moves, and every sensor sees a room.
+SCENES = ("timing_ur10e", "timing_panda")
+SET = ("goal.offset=[0.0, 0.25, 0.05]", "duration=3.5", "vertices_per_link=1000")
+EARLIEST, LATEST = 0.8, 1.2  # [s] of the onset, drawn
+RECOVERY = 0.5  # [s] after the fault's end, by when the arm must be free again
+COLUMNS = (
+    "right", "latency_ms", "reached", "worst_mode", "told", "recovered", "same_commands",
+    "qd_max", "true_min_m",
+)  # fmt: skip
+_SLACK = 1e-9  # [s] a tick at the bound is in time
+_ROW_OF = {row.name: row for row in ROWS}
+
+
+def plan(wishes: Wishes) -> Campaign:
+    """Every row on every robot, each run with its own onset, sensor and noise.
+
+    Raises:
+        ProxError: a scene that does not load, or whose sensors do not fit the rows.
+    """
+    trials: list[Trial] = []
+    for source in wishes.scenarios or SCENES:
+        base = load_scenario(source, (*SET, *wishes.overrides))
+        sensors = len(Setup.of(base, robot_of(base)).skin)
+        for place, row in enumerate(ROWS):
+            for number in range(wishes.runs):
+                draw = np.random.default_rng([wishes.seed, number, place])
+                onset = round(float(draw.uniform(EARLIEST, LATEST)), 3)
+                faults = row.faults(int(draw.integers(sensors)))
+                text = _assignment(faults, onset, onset + row.duration)
+                overrides = (*SET, *wishes.overrides, text)
+                trials.append(
+                    Trial(
+                        scenario=load_scenario(source, overrides), source=source,
+                        overrides=overrides, controller="wb", seed=wishes.seed + number,
+                        tags={"robot": base.robot, "row": row.name, "run": number},
+                    )
+                )  # fmt: skip
+    if not trials:
+        raise ConfigError("--runs: no trial is left")
+    description = {
+        "kind": "faults", "seed": wishes.seed, "scenarios": list(wishes.scenarios or SCENES),
+        "set": list(wishes.overrides),
+    }  # fmt: skip
+    return Campaign(description=description, trials=trials, perform=perform, columns=COLUMNS)
+
+
+def _assignment(faults: Any, start: float, end: float) -> str:
+    """The `[[fault]]` tables as one assignment."""
+    tables = []
+    for fault in faults:
+        keys = [
+            f'{key} = "{value}"' if isinstance(value, str) else f"{key} = {value}"
+            for key, value in fault.items()
+        ]
+        tables.append("{" + ", ".join([*keys, f"from = {start}", f"to = {round(end, 3)}"]) + "}")
+    return f"fault=[{', '.join(tables)}]"
+
+
+def perform(trial: Trial, report: Report) -> Numbers:
+    """One trial beside its row's requirements."""
+    row = _ROW_OF[str(trial.tags["row"])]
+    log = simulate(trial.scenario, trial.controller, trial.seed, report)
+    # By ticks, because the caller's clock may be what jumps.
+    time = np.arange(len(log.mode)) / trial.scenario.simulation.control_hz
+    onset = trial.scenario.faults[0].start
+    after = time >= onset
+    reached = after & (log.mode >= row.least)
+    latency = float(time[reached][0] - onset) if reached.any() else np.inf
+    worst = int(log.mode[after].max())
+    free = time > onset + row.duration + RECOVERY
+    recovered = row.least == STOP or bool((log.mode[free] == RUN).all())
+    told = not row.finding or log.findings.get(row.finding, 0) > 0
+    same = not row.same_commands or _same_commands(trial, log, report)
+    in_time = row.least == RUN or latency <= row.within + 0.01 + _SLACK  # the tick it falls into
+    right = in_time and worst <= row.most and told and recovered and same
+    return {
+        "right": bool(right and np.isfinite(log.qd).all()),
+        "latency_ms": 1000.0 * latency if np.isfinite(latency) and row.least > RUN else None,
+        "reached": bool(reached.any()),
+        "worst_mode": MODES[worst],
+        "told": told,
+        "recovered": recovered,
+        "same_commands": same,
+        "qd_max": float(np.abs(log.qd).max()),
+        "true_min_m": log.summary()["true_min_m"],
+    }
+
+
+def _same_commands(trial: Trial, log: TrialLog, report: Report) -> bool:
+    """Are the commands those of the same trial without the fault, to the bit?"""
+    healthy = replace(trial, scenario=trial.scenario.model_copy(update={"faults": ()}))
+    other = simulate(healthy.scenario, trial.controller, trial.seed, report)
+    return log.qd.tobytes() == other.qd.tobytes()
+
+
+def analyse(table: pl.DataFrame, campaign: Campaign) -> Summary:
+    """The numbers of `summary.json`: per robot and row, how many were right and how soon."""
+    done = table.filter(pl.col("error").is_null())
+    rows: dict[str, dict[str, Any]] = {}
+    for (robot, name), part in done.group_by(["robot", "row"], maintain_order=True):
+        latency = part["latency_ms"].drop_nulls()
+        counts = part["worst_mode"].value_counts().sort("worst_mode")
+        rows.setdefault(str(robot), {})[str(name)] = {
+            "runs": len(part),
+            "right": int(part["right"].sum()),
+            "latency_median_ms": latency.median(),
+            "latency_max_ms": latency.max(),
+            "worst_modes": dict(counts.iter_rows()),
+        }
+    return {
+        "robots": rows,
+        "right": int(done["right"].sum()),
+        "self_min_m": None,
+        "trials_right_share": float(done["right"].mean() or 0.0) if len(done) else None,
+    }
+
+
+def listings(summary: Summary) -> list[Listing]:
+    """Row, robot, runs, right mode, latency, worst."""
+    lines = []
+    for robot, rows in summary["robots"].items():
+        for name, found in rows.items():
+            row = _ROW_OF[name]
+            bound = f"{1000 * row.within:.0f}" if row.least > RUN else "-"
+            lines.append(
+                (
+                    name, robot, _required(row), str(found["runs"]), str(found["right"]),
+                    _ms(found["latency_median_ms"]), _ms(found["latency_max_ms"]), bound,
+                    ", ".join(f"{mode} {n}" for mode, n in found["worst_modes"].items()),
+                )
+            )  # fmt: skip
+    return [
+        Listing(
+            caption="Every fault lasts 1 s (one missed deadline: a tick) and begins at a random "
+            "moment, at a random sensor. Right: the required mode in time and no other, the finding "
+            "told, the arm free again 0.5 s after the fault; where no command may change, the same "
+            "commands to the bit as without it. Latency from the fault's onset, told at the next "
+            "tick (10 ms).",
+            names=("fault", "robot", "required", "runs", "right", "median", "worst", "bound",
+                   "farthest mode"),
+            units=("", "", "", "", "", "ms", "ms", "ms", "runs"),
+            rows=lines, left=3,
+        )
+    ]  # fmt: skip
+
+
+def _required(row: Row) -> str:
+    if row.least == row.most:
+        return MODES[row.least]
+    return f"{MODES[row.least]} or {MODES[row.most]}"
+
+
+def _ms(value: float | None) -> str:
+    return "-" if value is None else f"{value:.0f}"
+
+
+def verdicts(summary: Summary) -> list[str]:
+    """How many were right, and which rows were not."""
+    wrong = [
+        f"{name} on {robot} ({found['right']} of {found['runs']})"
+        for robot, rows in summary["robots"].items()
+        for name, found in rows.items()
+        if found["right"] < found["runs"]
+    ]
+    runs = sum(found["runs"] for rows in summary["robots"].values() for found in rows.values())
+    told = [f"The behaviour was right in {summary['right']} of {runs} runs."]
+    return [*told, "Not always right: " + "; ".join(wrong) + "."] if wrong else told
+
+
+def figures(table: pl.DataFrame) -> dict[str, Figure]:
+    """Latency of every run, row by row, beside its bound."""
+    done = table.filter(pl.col("error").is_null())
+    robots = done["robot"].unique(maintain_order=True).to_list()
+    rows = [row for row in ROWS if row.least > RUN]
+    figure = Figure(figsize=(4.2 * max(len(robots), 1) + 1.6, 4.6), dpi=DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    colours = {DEGRADED: "#E69F00", HOLD: "#D55E00", STOP: "#333333"}
+    for ax, robot in zip(
+        np.atleast_1d(figure.subplots(1, max(len(robots), 1), sharey=True)), robots, strict=True
+    ):
+        for height, row in enumerate(reversed(rows)):
+            own = done.filter(pl.col("robot") == robot, pl.col("row") == row.name)
+            latency = own["latency_ms"].drop_nulls().to_numpy()
+            spread = np.linspace(-0.25, 0.25, len(latency))
+            ax.plot(
+                latency, height + spread, ".", color=colours[row.least], markersize=4, alpha=0.6
+            )
+            ax.plot([1000 * row.within] * 2, [height - 0.4, height + 0.4], color=GREY, lw=2)
+        ax.set_title(robot)
+        ax.set_xlabel("time to the required mode [ms]")
+        ax.set_yticks(range(len(rows)), [row.name for row in reversed(rows)], fontsize=9)
+        ax.spines[["top", "right"]].set_visible(False)
+        ax.set_xlim(left=0.0)
+    return {"latency.png": figure}
+
+
+def captions(summary: Summary) -> dict[str, str]:
+    """What the figure shows."""
+    return {
+        "latency.png": "Time from the fault's onset to the required mode, one dot a run; grey: the "
+        "bound. Yellow: DEGRADED, red: HOLD, black: STOP."
+    }
+
+
+def worst(table: pl.DataFrame) -> list[str]:
+    """Those that were wrong, then the slowest."""
+    done = table.filter(pl.col("error").is_null())
+    order = done.sort(
+        "right", "latency_ms", "key", descending=[False, True, False], nulls_last=True
+    )
+    return order["key"].to_list()
+
+
+KIND = Kind(
+    title="Faults",
+    introduction="A fault between the world and the controller while the arm moves: what mode "
+    "follows, how soon, and whether the arm recovers. Engineering figures from a simulation, not a "
+    "certificate.",
+    plan=plan, analyse=analyse, listings=listings, verdicts=verdicts, figures=figures,
+    captions=captions, worst=worst,
+)  # fmt: skip
