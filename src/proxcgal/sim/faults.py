@@ -56,8 +56,8 @@ class FaultInjector:
         for fault in self._faults:
             scans = fault.apply(given.time, scans)
         given = replace(given, scans=tuple(scans))
-        for fault in self._inputs:
-            given = _spoiled_input(fault, given)
+        for of_input in self._inputs:
+            given = _spoiled_input(of_input, given)
         return given
 
 

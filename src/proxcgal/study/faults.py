@@ -138,7 +138,7 @@ def analyse(table: pl.DataFrame, campaign: Campaign) -> Summary:
         "robots": rows,
         "right": int(done["right"].sum()),
         "self_min_m": None,
-        "trials_right_share": float(done["right"].mean() or 0.0) if len(done) else None,
+        "right_share": int(done["right"].sum()) / len(done) if len(done) else None,
     }
 
 
@@ -159,10 +159,10 @@ def listings(summary: Summary) -> list[Listing]:
     return [
         Listing(
             caption="Every fault lasts 1 s (one missed deadline: a tick) and begins at a random "
-            "moment, at a random sensor. Right: the required mode in time and no other, the finding "
-            "told, the arm free again 0.5 s after the fault; where no command may change, the same "
-            "commands to the bit as without it. Latency from the fault's onset, told at the next "
-            "tick (10 ms).",
+            "moment, at a random sensor. Right: the required mode in time and no other, the "
+            "finding told, the arm free again 0.5 s after the fault; where no command may change, "
+            "the same commands to the bit as without it. Latency from the fault's onset, told at "
+            "the next tick (10 ms).",
             names=("fault", "robot", "required", "runs", "right", "median", "worst", "bound",
                    "farthest mode"),
             units=("", "", "", "", "", "ms", "ms", "ms", "runs"),
