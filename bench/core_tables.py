@@ -17,9 +17,10 @@ COLUMNS = {"median": "median_us", "p99": "p99_us", "p99.9": "p99.9_us", "worst":
 HEAD = """## The core, called from C++
 
 Thread CPU time in microseconds on the meshes and clouds of `proxcgal sweep`: 10 000 vertices a
-link, raw cloud. `tick` gets a new scan of all 30 sensors (1920 zones) every time; `many` is the
-cloud 1, 10 and 100 times; `inside` and `sphere_centre` are placed where hardly any box can be left
-out, and may end with a marked lower bound.
+link, raw cloud. `tick/scans` and `tick/five_tasks` get a new scan of all 30 sensors (1920 zones)
+every time; `many` is the filtered cloud brought to 1, 10 and 100 times 1920 points; `inside`,
+`inside_all_links` and `sphere_centre` are placed where hardly any box can be left out, and may end
+with a marked lower bound.
 """
 LOOPS = """### The literal form beside plain CGAL
 

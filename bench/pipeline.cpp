@@ -65,6 +65,9 @@ void add_stages(const Cell& cell) {
         fast ? 2000 : 5, [&cell, method](benchmark::State& state) {
           const std::size_t n = cell.tolerance.size();
           const auto keep = std::make_unique<bool[]>(n);
+          // The literal form's trees are built at the first question.
+          remove_body(*cell.robot, cell.posture, cell.origins_W, cell.points_W, cell.tolerance,
+                      cell.min_hit, method, {keep.get(), n});
           Samples samples;
           for (auto _ : state) {
             std::fill_n(keep.get(), n, true);
@@ -251,8 +254,10 @@ void add_adversarial(const Cell& cell) {
       Samples samples;
       ClosestPair pair;
       for (auto _ : state) {
-        samples.take(
-            state, [&] { pair = closest_pair(*cell.robot, cell.posture, *points, Method::kFast); });
+        samples.take(state, [&] {
+          std::int64_t steps = kSearchSteps;
+          pair = closest_pair(*cell.robot, cell.posture, *points, Method::kFast, {.steps = &steps});
+        });
       }
       samples.report(state, kWorstBudget);
       state.counters["lower_bound"] = pair.lower_bound ? 1 : 0;
