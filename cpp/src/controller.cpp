@@ -60,6 +60,8 @@ struct Controller::Impl {
   std::size_t n_kept = 0;  // ever
   bool frozen = false;     // STOP came: what led to it stays
 
+  bool by_sensors = false;  // this tick's cloud is the sensors', not known points
+
   JointVector qd_last;
   Posture posture;
   std::array<BuiltTask, kMaxLevels> built;
@@ -216,7 +218,7 @@ struct Controller::Impl {
       const JointVector row = opening_row(*robot, posture, control);
       keep_rate(row, 0.0, box, out.qd);
     }
-    for (int s = 0; s < perception.sensors(); ++s) {
+    for (int s = 0; by_sensors && s < perception.sensors(); ++s) {
       const auto sensor = static_cast<std::size_t>(s);
       const double blind = perception.blind_for(sensor, clock, config.monitor);
       if (blind > config.monitor.degraded_after) slow_into_view(s, blind, box);
@@ -326,6 +328,7 @@ struct Controller::Impl {
            const Pose& goal) {
     detail::Stopwatch watch(config.timings);
     robot->update(q, posture);
+    by_sensors = sensed;
     const double d_min = avoidance ? avoidance->d_min : 0.0;
     out.pair =
         control_points.nearest(clock, *robot, posture, cloud_W, d_min, engaged_within(), monitor);

@@ -330,6 +330,20 @@ TEST(Controller, AnObstacleThatTouchesIsNotTakenForBody) {
   EXPECT_FALSE(found(controller, Reason::kContact));
 }
 
+TEST(Controller, OnKnownPointsSilentSensorsSlowNothing) {
+  const auto robot = test::arm();
+  JointVector q = bent();
+  const Pose goal = goal_near(*robot, q);
+  const Points far = Points::Constant(1, 3, 3.0);
+  Controller bare(robot, Skin{}, ControllerConfig{}),
+      covered(robot, test::ring(10), ControllerConfig{});
+  for (int i = 0; i < 50; ++i) {
+    const JointVector qd = bare.tick_known(0.01 * i, q, far, goal).qd;
+    EXPECT_EQ(covered.tick_known(0.01 * i, q, far, goal).qd, qd);
+    q += 0.01 * qd;
+  }
+}
+
 TEST(Controller, MotionIntoWhatASilentSensorSawIsHeld) {
   const auto robot = test::arm();
   Skin skin = test::ring(10);
