@@ -18,6 +18,7 @@ constexpr double kEngaged = 0.5;      // activation from which avoidance must be
 constexpr double kRigid = 1e-6;       // how far a goal's rotation may be from orthonormal
 constexpr double kFarthest = 1e9;     // [m] squares stay far inside single precision
 constexpr double kBelieved = 0.1;     // [s] inside d_min: longer than one scan lasts
+constexpr double kTouching = 1e-9;    // [m] nearer than this no normal is left
 constexpr double kInto = 0.02;        // [m/s] slower motion into the unseen holds nothing up
 
 /// Middle and corners of a sensor's field of view, in its frame.
@@ -163,13 +164,30 @@ struct Controller::Impl {
     return control;
   }
 
+  Vector3 middle_W(int link) const {
+    return posture.T_WL[static_cast<std::size_t>(link)] * robot->tree(link).bounds().center;
+  }
+
+  bool is_inside(const ClosestPair& pair) const {
+    const Pose& T_WL = posture.T_WL[static_cast<std::size_t>(pair.link)];
+    return robot->tree(pair.link).inside(T_WL.linear().transpose() *
+                                         (pair.obstacle_W - T_WL.translation()));
+  }
+
   /// Is the pair's distance to be shortened, or turned over?
   void trust(const PointsRef& cloud_W, bool sensed) {
     const Vector3 apart =
         out.pair ? Vector3(out.pair->surface_W - out.pair->obstacle_W) : Vector3(Vector3::Zero());
     out.trusted_distance = out.pair ? out.pair->distance : kInfinity;
     if (!sensed) {
-      if (out.trusted_distance > 0.0) outward_W = apart.normalized();
+      if (!out.pair) return;
+      if (is_inside(*out.pair)) out.trusted_distance = -out.pair->distance;
+      // Where the point is on the surface, and no normal held before: out from the link's centre.
+      if (apart.norm() > kTouching) {
+        outward_W = apart.normalized() * (out.trusted_distance < 0.0 ? -1.0 : 1.0);
+      } else if (outward_W.isZero()) {
+        outward_W = (middle_W(out.pair->link) - out.pair->obstacle_W).normalized();
+      }
       return;
     }
     for (int s = 0; s < perception.sensors(); ++s) {

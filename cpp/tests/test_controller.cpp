@@ -273,7 +273,7 @@ TEST(Controller, InsideTheLeastDistanceNothingComesNearer) {
         pair.link = out.pair->link;
         pair.control_W = out.pair->surface_W;
         pair.obstacle_W = out.pair->obstacle_W;
-        pair.distance = out.pair->distance;
+        pair.distance = out.trusted_distance;  // negative inside: out is the other way
         const JointVector row = opening_row(*robot, posture, pair);
         const Limits limits{robot->q_min(), robot->q_max(), robot->qd_max(), robot->qdd_max()};
         const Admissible box = admissible(limits, q, before, config.period);
@@ -328,6 +328,55 @@ TEST(Controller, AnObstacleThatTouchesIsNotTakenForBody) {
   scan.status[27] = 5;
   controller.tick(4.2, q, std::span(&scan, 1), goal);
   EXPECT_FALSE(found(controller, Reason::kContact));
+}
+
+/// The signed distance from a point to a link: negative inside.
+double signed_distance(const Robot& robot, const Posture& posture, int link, const Vector3& p_W) {
+  const Vector3 p_L = posture.T_WL[static_cast<std::size_t>(link)].inverse() * p_W;
+  const double distance = std::sqrt(robot.tree(link).nearest(p_L)->squared_distance);
+  return robot.tree(link).inside(p_L) ? -distance : distance;
+}
+
+TEST(Controller, FromContactAndFromInsideEveryCommandLeadsOut) {
+  const auto robot = test::arm();
+  Random random(27);
+  ControllerConfig config;
+  config.monitor.stuck_after = 1e9;
+  int led = 0, deep = 0;
+  for (int trial = 0; trial < 300; ++trial) {
+    const JointVector q = test::posture(random, 6);
+    Posture posture = robot->make_posture(), next = robot->make_posture();
+    robot->update(q, posture);
+    // A point up to 10 mm under the surface of a link, or on it.
+    const int link = 2 + trial % 5;
+    const Points& v = robot->tree(link).vertices_L();
+    const Vector3 surface_L = v.row(
+        static_cast<Eigen::Index>(random.uniform(0, 1) * 0.999 * static_cast<double>(v.rows())));
+    const Vector3 centre_L(0, 0, surface_L.z());
+    const double depth = trial % 3 == 0 ? 0.0 : random.uniform(0.0, 0.01);
+    const Vector3 inward = (centre_L - surface_L).normalized();
+    const Vector3 p_W = posture.T_WL[static_cast<std::size_t>(link)] * (surface_L + depth * inward);
+    Points points(1, 3);
+    points.row(0) = p_W.transpose();
+    Controller controller(robot, Skin{}, config);
+    const TickOutput& out = controller.tick_known(0.0, q, points, posture.T_WT);
+    if (!out.pair || out.pair->link != link || !inward.allFinite()) continue;
+    ControlPair pair;
+    pair.link = link;
+    pair.control_W = out.pair->surface_W;
+    pair.obstacle_W = p_W;
+    pair.distance = out.trusted_distance;
+    if (std::abs(out.trusted_distance) < 1e-6) continue;  // on the surface no slope is left to test
+    if (opening_row(*robot, posture, pair).norm() < 0.1) continue;
+    const double before = signed_distance(*robot, posture, link, p_W);
+    const double dt = 1e-3;  // short, so that the slope decides
+    robot->update(q + dt * out.qd, next);
+    EXPECT_GT(signed_distance(*robot, next, link, p_W), before);
+    ++led;
+    deep += before < -1e-4 ? 1 : 0;
+  }
+  EXPECT_GT(led, 80);
+  EXPECT_GT(deep, 40);
 }
 
 TEST(Controller, OnKnownPointsSilentSensorsSlowNothing) {

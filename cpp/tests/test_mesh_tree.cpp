@@ -131,6 +131,20 @@ TEST(MeshTree, ABoundFromBelowIsNeverAboveAndRisesWithItsSteps) {
   }
 }
 
+TEST(MeshTree, InsideIsWhereTheSurfaceIsFartherOut) {
+  const MeshTree tree = bumpy();  // star-shaped about its origin
+  Random random(26);
+  int inside = 0;
+  for (int i = 0; i < 5000; ++i) {
+    const Vector3 p = random.vector(0.25);
+    const double out = tree.first_hit(Vector3::Zero(), p.normalized());
+    if (std::abs(out - p.norm()) < 1e-6) continue;
+    EXPECT_EQ(tree.inside(p), p.norm() < out);
+    inside += tree.inside(p) ? 1 : 0;
+  }
+  EXPECT_GT(inside, 500);
+}
+
 TEST(MeshTree, ASearchWithoutStepsTellsSo) {
   const MeshTree tree = bumpy();
   std::int64_t none = 0, few = 2, enough = 100'000;

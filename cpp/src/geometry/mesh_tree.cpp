@@ -21,6 +21,8 @@ using Triangle3 = Kernel::Triangle_3;
 using Primitive = CGAL::AABB_triangle_primitive<Kernel, std::vector<Triangle3>::const_iterator>;
 using CgalTree = CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>>;
 
+constexpr int kMostCrossings = 64;
+constexpr double kApart = 1e-7;    // [m]
 constexpr double kFarthest = 1e9;  // [m] squares stay far inside single precision
 constexpr std::int64_t kAnySteps = std::numeric_limits<std::int64_t>::max();
 
@@ -156,6 +158,27 @@ bool MeshTree::any_hit(const Vector3& origin_L, const Vector3& direction_L, doub
 double MeshTree::first_hit(const Vector3& origin_L, const Vector3& direction_L,
                            double t_min) const {
   return impl_->bvh.first_hit(origin_L, direction_L, t_min);
+}
+
+bool MeshTree::inside(const Vector3& point_L) const {
+  const Bounds& box = impl_->bounds;
+  if ((point_L.array() < box.low.array() || point_L.array() > box.high.array()).any()) return false;
+  // Along no axis and in no symmetry plane, where drawn meshes have their edges.
+  static const std::array<Vector3, 3> rays{Vector3(0.5377, 0.2871, 0.7927).normalized(),
+                                           Vector3(-0.6113, 0.7411, -0.2777).normalized(),
+                                           Vector3(0.1931, -0.8263, -0.5291).normalized()};
+  int odd = 0;
+  for (const Vector3& ray : rays) {
+    int crossings = 0;
+    double from = 0.0;
+    for (; crossings < kMostCrossings; ++crossings) {
+      const double hit = impl_->bvh.first_hit(point_L, ray, from);
+      if (std::isinf(hit)) break;
+      from = hit + kApart;  // what lies nearer together is one wall
+    }
+    odd += crossings % 2;
+  }
+  return odd >= 2;
 }
 
 double MeshTree::distance(const MeshTree& other, const Pose& T_LO, double bound, Vector3* on_this_L,

@@ -68,6 +68,10 @@ class MeshTree {
   /// Smallest t >= t_min of a hit of origin + t direction; infinity where nothing is hit.
   double first_hit(const Vector3& origin_L, const Vector3& direction_L, double t_min = 0.0) const;
 
+  /// Is the point inside the surface? By the parity of crossings along three rays, two of which
+  /// decide: drawn meshes are open here and there.
+  bool inside(const Vector3& point_L) const;
+
   /// Distance between two surfaces, 0 where they cross.
   /// @param T_LO   pose of the other link's frame in this one
   /// @param bound  only surface nearer than this counts; infinity is returned past it [m]
