@@ -137,7 +137,7 @@ ClosestPair ControlPoints::settled(double time, const Robot& robot, const Postur
   const bool may_stay = link_ >= 0 && time - switched_ < kLeastTime && nearest.distance >= d_min &&
                         !passed_over_[static_cast<std::size_t>(link_)];
   if (may_stay) {
-    const ClosestPair same = closest_pair(
+    ClosestPair same = closest_pair(
         robot, posture, cloud_W, method_,
         {.links = std::span(&link_, 1), .within = nearest.distance + kNearerBy, .steps = &steps_});
     if (same.found()) return same;

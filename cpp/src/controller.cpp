@@ -31,6 +31,11 @@ std::array<Vector3, 5> view_directions(const SensorModel& model) {
   return directions;
 }
 
+double distance_of(const std::optional<ClosestPair>& pair) {
+  if (!pair) return kInfinity;
+  return pair->distance;
+}
+
 bool is_rigid(const Pose& T) {
   return T.matrix().allFinite() &&
          (T.linear() * T.linear().transpose() - Eigen::Matrix3d::Identity()).norm() < kRigid &&
@@ -178,7 +183,7 @@ struct Controller::Impl {
   void trust(const PointsRef& cloud_W, bool sensed) {
     const Vector3 apart =
         out.pair ? Vector3(out.pair->surface_W - out.pair->obstacle_W) : Vector3(Vector3::Zero());
-    out.trusted_distance = out.pair ? out.pair->distance : kInfinity;
+    out.trusted_distance = distance_of(out.pair);
     if (!sensed) {
       if (!out.pair) return;
       if (is_inside(*out.pair)) out.trusted_distance = -out.pair->distance;
@@ -388,7 +393,7 @@ struct Controller::Impl {
     record.mode = out.mode;
     record.q = q.size() == robot->n_q() ? q : JointVector::Constant(robot->n_q(), kInfinity);
     record.qd = out.qd;
-    record.distance = out.pair ? out.pair->distance : kInfinity;
+    record.distance = distance_of(out.pair);
     record.link = out.pair ? out.pair->link : -1;
     record.origin = out.pair_origin;
     record.n_findings = static_cast<int>(monitor.findings().size());
