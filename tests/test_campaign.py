@@ -1,5 +1,6 @@
 """Many trials: none is repeated, none is lost, and how they were run changes no number."""
 
+import contextlib
 import json
 import os
 import random
@@ -7,12 +8,11 @@ import shlex
 import signal
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +22,7 @@ from scipy import stats
 
 import proxcgal as px
 from proxcgal.apps import cli
+from proxcgal.apps.kept import keep_worst
 from proxcgal.sim.recording import read_recording
 from proxcgal.sim.replay import first_difference
 from proxcgal.sim.scenario import load_scenario
@@ -33,6 +34,7 @@ from proxcgal.study.draws import crosses, draw_scene, reachable
 from proxcgal.study.kind import Wishes
 from proxcgal.study.pool import Pool
 from proxcgal.study.store import Outcome, Store
+from proxcgal.study.trials import robot_of
 
 SMALL = ("--scenario", "front_plane", "--runs", "2", "--set", "duration=0.2")
 ONE = (*SMALL[:3], "1", *SMALL[4:], "--workers", "1", "--quiet")
@@ -42,6 +44,8 @@ PROGRAM = [sys.executable, "-c", "import sys; from proxcgal.apps.cli import main
 PERFORM = """
 import os, signal
 from pathlib import Path
+
+from proxcgal.study import static
 
 def ours(trial):
     return (trial.controller, trial.tags["draw"]) == ("sm", 0)
@@ -60,6 +64,14 @@ def dies_always(trial, report):
     if ours(trial):
         os.kill(os.getpid(), signal.SIGKILL)
     return numbers(trial, report)
+
+def dies_once_truly(trial, report):
+    with open("begun", "a") as begun:
+        begun.write(trial.name + "\\n")
+    if ours(trial) and not Path("died").exists():
+        Path("died").touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return static.perform(trial, report)
 
 def fails(trial, report):
     if ours(trial):
@@ -135,7 +147,7 @@ def wait_until(true: Callable[[], bool], patience: float = 120.0) -> None:
 # --- Interruptions
 
 
-def test_after_a_kill_of_everything_no_finished_trial_is_repeated(
+def test_after_a_kill_of_everything_two_workers_go_on_and_give_the_summary_of_one(
     call: Call, whole: Path, tmp_path: Path
 ) -> None:
     folder = tmp_path / "killed"
@@ -148,7 +160,7 @@ def test_after_a_kill_of_everything_no_finished_trial_is_repeated(
     program.communicate()
     before = trial_files(folder)
     assert 2 <= len(before) < 6
-    answer = call(*SMALL, "--workers", "1", "--keep", "worst:1", "--out", folder)
+    answer = call(*SMALL, "--workers", "2", "--keep", "worst:1", "--out", folder)
     assert answer.code == 0
     after = trial_files(folder)
     assert len(after) == 6
@@ -228,10 +240,10 @@ def test_a_failed_trial_is_told_with_what_repeats_it(
 ) -> None:
     real = static.simulate
 
-    def simulate(scenario: object, controller: str, *rest: object) -> object:
+    def simulate(scenario: object, controller: str, *rest: object, **keys: object) -> object:
         if controller == "sm":
             raise px.SimulationError("MuJoCo warned")
-        return real(scenario, controller, *rest)  # type: ignore[arg-type]
+        return real(scenario, controller, *rest, **keys)  # type: ignore[arg-type]
 
     monkeypatch.setattr(static, "simulate", simulate)
     answer = call(*ONE, "--keep", "none", "--out", "here")
@@ -249,7 +261,7 @@ def test_a_failed_trial_is_told_with_what_repeats_it(
 def test_a_campaign_of_which_every_trial_fails_still_tells_so(
     call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def simulate(*_: object) -> object:
+    def simulate(*_: object, **__: object) -> object:
         raise px.SimulationError("MuJoCo warned")
 
     monkeypatch.setattr(static, "simulate", simulate)
@@ -260,12 +272,6 @@ def test_a_campaign_of_which_every_trial_fails_still_tells_so(
 
 
 # --- The same on any number of workers, in any order, on a cluster
-
-
-def test_two_workers_give_the_summary_of_one(call: Call, whole: Path, tmp_path: Path) -> None:
-    arguments = (*SMALL, "--workers", "2", "--keep", "worst:1", "--quiet", "--out", "two")
-    assert call(*arguments).code == 0
-    assert summary(tmp_path / "two") == summary(whole)
 
 
 def test_order_changes_no_number(call: Call, planned: Campaign, whole: Path) -> None:
@@ -280,33 +286,63 @@ def test_order_changes_no_number(call: Call, planned: Campaign, whole: Path) -> 
 
 
 @pytest.fixture
-def cluster() -> Iterator[object]:
+def cluster() -> Iterator[Callable[..., str]]:
+    """Starts a scheduler with two workers, or as many as asked for; gives its address."""
     distributed = pytest.importorskip("distributed")
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
-    ) as cluster:
-        yield cluster
+    with contextlib.ExitStack() as clusters:
+
+        def start(workers: int = 2) -> str:
+            cluster = distributed.LocalCluster(
+                n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None
+            )
+            address: str = clusters.enter_context(cluster).scheduler_address
+            return address
+
+        yield start
 
 
-def test_a_cluster_that_loses_a_worker_gives_the_summary_of_one_process(
-    call: Call, whole: Path, cluster: object, tmp_path: Path
+def test_a_cluster_that_loses_a_worker_with_its_trial_gives_the_summary_of_one_process(
+    call: Call,
+    whole: Path,
+    performs: ModuleType,
+    cluster: Callable[..., str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    folder = tmp_path / "far"
-    nanny = next(iter(cluster.workers.values()))  # type: ignore[attr-defined]
-    first = nanny.pid
-
-    def kill() -> None:
-        wait_until(lambda: len(trial_files(folder)) >= 1)
-        os.kill(first, signal.SIGKILL)
-
-    killer = threading.Thread(target=kill)
-    killer.start()
-    address = cluster.scheduler_address  # type: ignore[attr-defined]
-    answer = call(*SMALL, "--cluster", address, "--keep", "worst:1", "--quiet", "--out", folder)
-    killer.join()
+    monkeypatch.setattr(static, "perform", performs.dies_once_truly)
+    address = cluster()
+    answer = call(*SMALL, "--cluster", address, "--keep", "worst:1", "--quiet", "--out", "far")
     assert answer.code == 0
-    assert summary(folder) == summary(whole)
-    wait_until(lambda: nanny.pid not in (None, first))
+    begun = Path("begun").read_text().split()
+    assert begun.count("front_plane-0-sm") == 2
+    assert len(set(begun)) == 6
+    assert summary(Path("far")) == summary(whole)
+
+
+def test_a_trial_that_kills_every_worker_of_a_cluster_stops_no_other(
+    performs: ModuleType, planned: Campaign, cluster: Callable[..., str], tmp_path: Path
+) -> None:
+    dask = pytest.importorskip("dask")
+    with dask.config.set({"distributed.scheduler.allowed-failures": 0}):
+        address = cluster()
+    campaign = replace(planned, perform=performs.dies_always, columns=["number"])
+    with Pool(1, address) as pool, Store(tmp_path / "store", {}) as store:
+        ended = run_campaign(campaign, store, pool)
+    assert [each.outcome.error for each in ended] == [
+        None, "its worker process died, once (out of memory?)", *[None] * 4,
+    ]  # fmt: skip
+
+
+def test_a_cluster_without_workers_is_told_as_such(
+    call: Call, cluster: Callable[..., str], tmp_path: Path
+) -> None:
+    address = cluster(0)
+    answer = call("--runs", "1", "--quiet", "--cluster", address)
+    assert answer.code == 2
+    assert answer.err == (
+        f"proxcgal: --cluster {address}: has no workers; start some with `dask worker {address} "
+        "--nthreads 1`\n"
+    )
+    assert not (tmp_path / "out").exists()
 
 
 # --- What is written
@@ -350,11 +386,52 @@ def test_a_kept_recording_holds_the_ticks_with_scans_and_cannot_be_computed_agai
         first_difference(recording)
 
 
-def test_every_tick_is_kept_where_asked_for(call: Call, whole: Path) -> None:
-    assert call(*ONE, "--keep", "worst:1", "--every-tick", "--out", "here").code == 0
-    recording = read_recording(next(Path("here/recordings").iterdir()))
+def test_a_recording_that_is_there_is_not_made_again_and_every_tick_kept_where_asked_for(
+    call: Call,
+) -> None:
+    arguments = (*ONE, "--keep", "worst:1", "--out", "here")
+    assert call(*arguments).code == 0
+    file = next(Path("here/recordings").iterdir())
+    before = file.stat()
+    assert call(*arguments).code == 0
+    assert (file.stat().st_ino, file.stat().st_mtime_ns) == (before.st_ino, before.st_mtime_ns)
+    assert call(*arguments, "--every-tick").code == 0
+    recording = read_recording(file)
     assert len(recording.ticks) == 20
     assert first_difference(recording) is None
+
+
+@pytest.mark.parametrize("raises", [True, False])
+def test_a_recording_that_fails_is_told_and_costs_no_result(
+    call: Call, monkeypatch: pytest.MonkeyPatch, raises: bool
+) -> None:
+    def simulate(*_: object, recording: Path, **__: object) -> object:
+        recording.parent.mkdir(parents=True)
+        recording.touch()
+        if raises:
+            raise px.SimulationError("disk full")
+        return SimpleNamespace(recording_failure="disk full")
+
+    monkeypatch.setattr("proxcgal.study.trials.simulate", simulate)
+    answer = call(*ONE, "--keep", "worst:1", "--out", "here")
+    assert answer.code == 1
+    assert answer.err == "proxcgal: front_plane-0-wb: not recorded: disk full\n"
+    assert list(Path("here/recordings").iterdir()) == []
+    told = json.loads(summary(Path("here")))["worst"]
+    assert [(entry["name"], entry["error"]) for entry in told] == [
+        ("front_plane-0-wb", "disk full")
+    ]
+    assert pl.read_parquet("here/trials.parquet").shape[0] == 3
+    assert "not recorded: disk full" in Path("here/report.html").read_text()
+
+
+def test_recordings_of_other_trials_go_half_ones_too(tmp_path: Path) -> None:
+    (tmp_path / "recordings").mkdir()
+    for name in ("a.mcap", ".a.mcap"):
+        (tmp_path / "recordings" / name).touch()
+    with Pool(1) as pool:
+        assert keep_worst([], tmp_path, "scans", pool, quiet=True) == []
+    assert list((tmp_path / "recordings").iterdir()) == []
 
 
 def test_more_runs_go_on_where_fewer_ended(call: Call, whole: Path) -> None:
@@ -440,6 +517,40 @@ def test_another_campaigns_folder_is_refused(call: Call, whole: Path) -> None:
         "another folder, or remove that one"
     )
     assert trial_files(whole) == before
+
+
+def test_a_folder_of_another_build_is_refused(
+    call: Call, whole: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("proxcgal.sim.versions.build", lambda: "another")
+    answer = call(*SMALL, "--quiet", "--out", whole)
+    assert answer.code == 2
+    assert "holds another campaign: made_with is " in answer.err
+
+
+def test_a_folder_of_other_results_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "summary.json").write_text("{}")
+    with pytest.raises(px.ConfigError, match="holds results of something else"):
+        Store(tmp_path, {})
+    assert [path.name for path in tmp_path.iterdir()] == ["summary.json"]
+
+
+def test_scenes_whose_names_files_cannot_tell_apart_are_refused(call: Call) -> None:
+    content = load_scenario("front_plane").to_toml()
+    for name in ("a b", "a_b"):
+        Path(f"{name}.toml").write_text(content.replace('name = "front_plane"', f'name = "{name}"'))
+    answer = call("--runs", "1", "--quiet", "--scenario", "a b.toml", "a_b.toml")
+    assert answer.code == 2
+    assert answer.err == "proxcgal: --scenario a_b.toml: there is another one named a_b\n"
+
+
+def test_another_robot_under_the_same_name_is_refused(planned: Campaign) -> None:
+    trial = planned.trials[0]
+    slower = load_scenario("front_plane", ["limits.speed=0.5"])
+    assert robot_of(trial.scenario, trial.robot_digest).digest == trial.robot_digest
+    assert robot_of(slower).digest != trial.robot_digest
+    with pytest.raises(px.ConfigError, match="robot ur10e is another one here"):
+        static.perform(replace(trial, robot_digest="another"), lambda _: None)
 
 
 def test_two_processes_do_not_work_in_one_folder(call: Call, whole: Path) -> None:

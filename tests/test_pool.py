@@ -1,6 +1,9 @@
 """Jobs side by side: results in order, errors told, no worker left behind."""
 
 import functools
+import os
+import signal
+import time
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -25,6 +28,24 @@ def fail(report):
 
 def die(report):
     os.kill(os.getpid(), signal.SIGKILL)
+
+def pid(report):
+    return os.getpid()
+
+def deaf(mark, report):
+    Path(mark).touch()
+    time.sleep(0.5)
+    return "whole"
+
+def fail_after(mark, report):
+    while not Path(mark).exists():
+        time.sleep(0.01)
+    raise ValueError("on purpose")
+
+def once(mark, report):
+    with open(mark, "a") as begun:
+        begun.write("x")
+    time.sleep(0.2)
 
 def long(mark, report):
     try:
@@ -79,6 +100,36 @@ def test_an_error_stops_the_jobs_beside_it(jobs: ModuleType, tmp_path: Path) -> 
     with Pool(2) as pool, pytest.raises(ValueError, match="on purpose"):
         pool.run([functools.partial(jobs.long, str(mark)), jobs.fail])
     assert not mark.exists() or mark.read_text() == StoppedError.__name__
+
+
+def test_a_result_that_comes_while_the_others_are_stopped_is_taken(
+    jobs: ModuleType, tmp_path: Path
+) -> None:
+    mark = str(tmp_path / "mark")
+    done: dict[int, str] = {}
+    both = [functools.partial(jobs.deaf, mark), functools.partial(jobs.fail_after, mark)]
+    with Pool(2) as pool, pytest.raises(ValueError, match="on purpose"):
+        pool.run(both, on_done=done.__setitem__)
+    assert done == {0: "whole"}
+
+
+def test_the_death_of_an_idle_worker_costs_no_job(jobs: ModuleType, tmp_path: Path) -> None:
+    marks = [tmp_path / name for name in "abcd"]
+    with Pool(2) as pool:
+        for pid in set(pool.run([jobs.pid] * 4)):
+            os.kill(pid, signal.SIGKILL)
+        time.sleep(0.5)
+        pool.run([functools.partial(jobs.once, str(mark)) for mark in marks])
+    assert [mark.read_text() for mark in marks] == ["x"] * 4
+
+
+def test_a_death_costs_only_the_dead_ones_job(jobs: ModuleType, tmp_path: Path) -> None:
+    marks = [tmp_path / name for name in "abc"]
+    work = [functools.partial(jobs.once, str(mark)) for mark in marks]
+    with Pool(2) as pool:
+        results = pool.run([jobs.die, *work], on_lost=lambda row, deaths: (row, deaths))
+    assert results == [(0, 2), None, None, None]
+    assert [mark.read_text() for mark in marks] == ["x"] * 3
 
 
 def test_a_worker_that_dies_is_told_as_such(jobs: ModuleType) -> None:

@@ -16,10 +16,10 @@ from mcap.records import Message
 import proxcgal as px
 from proxcgal.sim import foxglove, packing
 from proxcgal.sim.boxes import rotation
-from proxcgal.sim.recorder import versions
 from proxcgal.sim.recording import Recorder, Recording, Settings, read_recording
 from proxcgal.sim.scenario import load_scenario
 from proxcgal.sim.ticks import Found, TaskResult, Tick, TickInput, TickResult, TickTruth
+from proxcgal.sim.versions import versions
 
 SCENARIO = load_scenario("front_plane", ["seed=3"])
 SETTINGS = Settings(scenario=SCENARIO, controller="wb", seed=3, meshes={"a": "b"})

@@ -21,6 +21,7 @@ from proxcgal.sim.scenario_keys import Fault
 from proxcgal.sim.setup import Setup
 from proxcgal.sim.ticks import TickInput
 from proxcgal.sim.trial import TrialLog, first_difference, recompute, run_trial
+from proxcgal.sim.trial_log import final_ticks
 
 SHORT = ["duration=1.0"]
 NAMES = [f"s{row}" for row in range(4)]
@@ -412,3 +413,19 @@ def test_the_static_planes_come_out_as_the_experiment_asks(runs: Runs) -> None:
 @pytest.mark.parametrize("seed", range(1, 10))
 def test_the_static_planes_come_out_so_with_every_seed(runs: Runs, seed: int) -> None:
     check_bounds(runs, seed)
+
+
+def test_a_clock_that_jumps_changes_neither_the_final_ticks_nor_those_recorded(
+    ur10e: px.Robot, tmp_path: Path
+) -> None:
+    jump = 'fault=[{kind = "clock_jump", from = 0.3, value = -5.0}]'
+    recorded = {}
+    for name, overrides in (("healthy", ()), ("jumped", (jump,))):
+        scenario = load_scenario("front_plane", ["duration=0.5", *overrides])
+        with Recorder(tmp_path / name, "scans") as recorder:
+            log = run_trial(scenario, "wb", robot=ur10e, recorder=recorder)
+        assert log.elapsed == pytest.approx(np.arange(50) / 100)
+        assert final_ticks(log.elapsed).all()
+        recorded[name] = len(read_recording(tmp_path / name).ticks)
+    assert log.time[-1] < 0.0
+    assert recorded["jumped"] == recorded["healthy"]

@@ -98,8 +98,7 @@ Output tick(Controller& controller, double time, nb::handle q, const std::vector
   const JointVector joints = vector_from(q, "q", controller.robot().n_q(), Take::kExact, false);
   const Pose T_WT = pose_from(goal, "goal", Take::kExact, false);
   const nb::gil_scoped_release release;
-  const double measured = q_stamp.value_or(std::numeric_limits<double>::quiet_NaN());
-  return kept(controller, controller.tick(time, joints, scans, T_WT, late, measured));
+  return kept(controller, controller.tick(time, joints, scans, T_WT, late, q_stamp));
 }
 
 Output tick_known(Controller& controller, double time, nb::handle q, nb::handle points,

@@ -19,6 +19,7 @@ constexpr double kRigid = 1e-6;       // how far a goal's rotation may be from o
 constexpr double kFarthest = 1e9;     // [m] squares stay far inside single precision
 constexpr double kBelieved = 0.1;     // [s] inside d_min: longer than one scan lasts
 constexpr double kTouching = 1e-9;    // [m] nearer than this no normal is left
+constexpr double kClockStep = 1e-3;   // [s] a stamp this far in the future is clock resolution
 constexpr double kInto = 0.02;        // [m/s] slower motion into the unseen holds nothing up
 
 /// Middle and corners of a sensor's field of view, in its frame.
@@ -127,17 +128,22 @@ struct Controller::Impl {
     caller_time = time;
   }
 
+  /// An age that is not a number, or below nothing, says that the stamp is of another clock.
+  void judge_age(double age) {
+    const bool known = age >= -kClockStep;  // written so that what is not a number is unknown
+    if (known && age <= config.monitor.joints_hold_after) return;
+    Finding stale;
+    stale.reason = known && age > config.monitor.joints_stop_after ? Reason::kJointStateLost
+                                                                   : Reason::kJointStateStale;
+    stale.age = age;
+    monitor.add(stale);
+  }
+
   /// Joint state and goal are usable; else the reason is noted.
-  bool usable(double time, const JointVector& q, double q_stamp, const Pose& goal) {
+  bool usable(double time, const JointVector& q, std::optional<double> q_stamp, const Pose& goal) {
     const bool joints = q.size() == robot->n_q() && q.allFinite();
     if (!joints) note(Reason::kJointStateInvalid);
-    Finding stale;
-    stale.age = time - q_stamp;  // not a number: just measured
-    if (stale.age > config.monitor.joints_hold_after) {
-      stale.reason = stale.age > config.monitor.joints_stop_after ? Reason::kJointStateLost
-                                                                  : Reason::kJointStateStale;
-      monitor.add(stale);
-    }
+    if (q_stamp) judge_age(time - *q_stamp);
     const bool rigid = is_rigid(goal);
     if (!rigid) note(Reason::kGoalInvalid);
     return joints && rigid;
@@ -233,18 +239,19 @@ struct Controller::Impl {
     }
   }
 
-  /// Inside d_min nothing may come nearer, into what is not seen nothing may move fast.
+  /// Into what is not seen nothing may move fast, and inside d_min nothing may come nearer: the
+  /// second has the last word, because that obstacle is known to be there.
   void restrain(const Admissible& box, const Vector3& velocity_W) {
+    for (int s = 0; by_sensors && s < perception.sensors(); ++s) {
+      const auto sensor = static_cast<std::size_t>(s);
+      const double blind = perception.blind_for(sensor, clock, config.monitor);
+      if (blind > config.monitor.degraded_after) slow_into_view(s, blind, box);
+    }
     const bool whole_body = config.control_point == ControlPoint::kWholeBody;
     if (whole_body && avoidance && out.pair && out.trusted_distance < avoidance->d_min) {
       const ControlPair control = control_of_pair(velocity_W);
       const JointVector row = opening_row(*robot, posture, control);
       keep_rate(row, 0.0, box, out.qd);
-    }
-    for (int s = 0; by_sensors && s < perception.sensors(); ++s) {
-      const auto sensor = static_cast<std::size_t>(s);
-      const double blind = perception.blind_for(sensor, clock, config.monitor);
-      if (blind > config.monitor.degraded_after) slow_into_view(s, blind, box);
     }
   }
 
@@ -424,7 +431,7 @@ Controller::Controller(std::shared_ptr<const Robot> robot, Skin skin, Controller
 Controller::~Controller() = default;
 
 const TickOutput& Controller::tick(double time, const JointVector& q, std::span<const Scan> scans,
-                                   const Pose& goal, bool late, double q_stamp) {
+                                   const Pose& goal, bool late, std::optional<double> q_stamp) {
   Impl& me = *impl_;
   detail::Stopwatch watch(me.config.timings);
   me.begin(time, late);
@@ -450,7 +457,7 @@ const TickOutput& Controller::tick_known(double time, const JointVector& q,
   Impl& me = *impl_;
   detail::Stopwatch watch(me.config.timings);
   me.begin(time, false);
-  bool usable = me.usable(time, q, std::numeric_limits<double>::quiet_NaN(), goal);
+  bool usable = me.usable(time, q, std::nullopt, goal);
   if (points_W.rows() > me.config.max_points || !points_W.allFinite() || !velocity_W.allFinite() ||
       (points_W.size() > 0 && points_W.cwiseAbs().maxCoeff() > kFarthest)) {
     me.note(Reason::kPointsInvalid);

@@ -252,6 +252,18 @@ TEST(Controller, AnOldJointStateHoldsAndAtLastStops) {
   EXPECT_EQ(controller.last_ticks().size(), 5U);
 }
 
+TEST(Controller, AJointStateOfAnotherClockHolds) {
+  const auto robot = test::arm();
+  Random random(28);
+  const JointVector q = bent();
+  const Pose goal = goal_near(*robot, q);
+  for (const double stamp : {std::nan(""), kInfinity, 3600.0}) {
+    Controller controller(robot, test::ring(), ControllerConfig{});
+    controller.tick(0.0, q, scans(random, 10, 0, 0.0, 1.0), goal, false, stamp);
+    EXPECT_TRUE(found(controller, Reason::kJointStateStale));
+  }
+}
+
 TEST(Controller, InsideTheLeastDistanceNothingComesNearer) {
   const auto robot = test::arm();
   ControllerConfig config;

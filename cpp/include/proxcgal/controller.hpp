@@ -114,10 +114,10 @@ class Controller {
   /// @param scans  since the last tick, may be empty
   /// @param goal   T_WT
   /// @param late   the caller missed its deadline since the last tick
-  /// @param q_stamp  [s] when q was measured, on the same clock; not a number: just now
+  /// @param q_stamp  [s] when q was measured, on the same clock; none: just now
   const TickOutput& tick(double time, const JointVector& q, std::span<const Scan> scans,
                          const Pose& goal, bool late = false,
-                         double q_stamp = std::numeric_limits<double>::quiet_NaN());
+                         std::optional<double> q_stamp = std::nullopt);
   /// The scene itself instead of scans.
   /// @param points_W    (n, 3), n <= max_points
   /// @param velocity_W  of the obstacle, zero where it is not known [m/s]

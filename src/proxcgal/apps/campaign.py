@@ -5,12 +5,14 @@ from __future__ import annotations
 import shlex
 import sys
 import time as clock
+from contextlib import nullcontext
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
+import tyro.extras
 
 from proxcgal.apps.options import Flag, Number, Settings, checked_workers, flat
 from proxcgal.errors import ConfigError
@@ -26,6 +28,10 @@ if TYPE_CHECKING:
 
 #: Module that holds each kind as its `KIND`.
 KINDS = {"static": "proxcgal.study.static", "faults": "proxcgal.study.faults"}
+if TYPE_CHECKING:
+    KindName = str
+else:
+    KindName = tyro.extras.literal_type_from_choices(KINDS)
 
 
 @dataclass(frozen=True)
@@ -48,9 +54,7 @@ class CampaignOptions:
       proxcgal campaign static --runs 1000 --cluster tcp://10.0.0.1:8786
     """
 
-    kind: Annotated[
-        Literal["static", "faults"], tyro.conf.Positional, tyro.conf.arg(metavar="static|faults")
-    ]
+    kind: Annotated[KindName, tyro.conf.Positional, tyro.conf.arg(metavar="|".join(KINDS))]
     """What is repeated."""
     runs: Annotated[int, tyro.conf.arg(metavar="N")] = 100
     """Draws of each scene, or runs of each fault and robot."""
@@ -112,7 +116,8 @@ def campaign_command(options: CampaignOptions, command: str) -> int:
         worst = kind.worst(table)[:kept]
         chosen = [next(e for e in ended if e.trial.key == key) for key in worst]
         ticks: RecordedTicks = "all" if options.every_tick else "scans"
-        recorded = keep_worst(chosen, folder, ticks, workers, quiet=options.quiet)
+        with nullcontext(pool) if options.cluster is None else Pool(workers) as near:
+            recorded = keep_worst(chosen, folder, ticks, near, quiet=options.quiet)
         failed = [e for e in ended if e.outcome.error is not None]
         summary = {
             "campaign": options.kind, "seed": options.seed, "runs": options.runs,
@@ -127,7 +132,7 @@ def campaign_command(options: CampaignOptions, command: str) -> int:
         report = write_report(folder)
     _print(kind, summary, folder)
     print(report)
-    return 1 if failed else 0
+    return 1 if failed or any("error" in entry for entry in recorded) else 0
 
 
 def _kept(options: CampaignOptions) -> int:
@@ -147,7 +152,7 @@ def _kept(options: CampaignOptions) -> int:
 
 def _packages() -> dict[str, str]:
     """What a trial's numbers depend on: those of other versions are not put beside them."""
-    from proxcgal.sim.recorder import versions
+    from proxcgal.sim.versions import versions
 
     return {name: v for name, v in versions().items() if name not in ("python", "machine")}
 
@@ -155,11 +160,12 @@ def _packages() -> dict[str, str]:
 def _check(campaign: Campaign) -> None:
     """Sets one trial of each scene up, so that nothing is written where something does not fit."""
     from proxcgal.apps.results import check
+    from proxcgal.study.trials import robot_of
 
     firsts = {trial.scenario.name: trial for trial in reversed(campaign.trials)}
     controllers = tuple(dict.fromkeys(trial.controller for trial in campaign.trials))
     for trial in firsts.values():
-        check(trial.scenario, controllers, quiet=True)
+        check(trial.scenario, controllers, robot_of(trial.scenario), quiet=True)
 
 
 def _perform(
@@ -186,8 +192,9 @@ def _perform(
         try:
             return run_campaign(campaign, store, pool, progress.shares, done)
         except KeyboardInterrupt:
+            kept = len(campaign.trials) - len(unfinished(campaign, store))
             raise KeyboardInterrupt(
-                f"{ended} of {len(campaign.trials)} trials are kept in {folder}; the same command "
+                f"{kept} of {len(campaign.trials)} trials are kept in {folder}; the same command "
                 "goes on from there"
             ) from None
 
@@ -215,6 +222,9 @@ def _print(kind: Kind, summary: dict[str, Any], folder: Path) -> None:
     if summary["worst"]:
         print("\nThe worst, recorded; what steps through each, and what runs it again:")
     for entry in summary["worst"]:
+        if "error" in entry:
+            print(f"proxcgal: {entry['name']}: not recorded: {entry['error']}", file=sys.stderr)
+            continue
         print(f"  {shlex.join(('proxcgal', 'replay', str(folder / entry['recording'])))}")
         print(f"    {entry['command']}")
     for entry in summary["failed"]:

@@ -72,6 +72,11 @@ def _commands(stored: StoredCampaign) -> Iterator[str]:
     if stored.summary["worst"]:
         yield "<h2>The worst</h2>"
     for entry in stored.summary["worst"]:
+        if "error" in entry:
+            reason = f"{entry['name']}: not recorded: {entry['error']}"
+            yield f"<p>{escape(reason)}</p>"
+            yield f'<pre class="wrap">{escape(str(entry["command"]))}</pre>'
+            continue
         file = stored.folder / str(entry["recording"])
         replay = shlex.join(("proxcgal", "replay", str(file)))
         yield f'<pre class="wrap">{escape(replay)}\n{escape(str(entry["command"]))}</pre>'

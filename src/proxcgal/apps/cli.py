@@ -138,7 +138,7 @@ def _tell(message: str) -> None:
 
 
 def _print_versions() -> int:
-    from proxcgal.apps.origin import versions
+    from proxcgal.sim.versions import versions
 
     print(f"proxcgal {metadata.version('proxcgal')}")
     for name, version in versions().items():

@@ -7,12 +7,10 @@ import platform
 import subprocess
 import tomllib
 from datetime import UTC, datetime
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-#: Packages whose version can change a result.
-PACKAGES = ("proxcgal", "numpy", "mujoco", "pin", "trimesh")
+from proxcgal.sim.versions import versions
 
 
 def origin(command: str) -> dict[str, Any]:
@@ -35,17 +33,6 @@ def machine() -> str:
     models = [line.partition(":")[2].strip() for line in told.splitlines() if "model name" in line]
     processor = f"{models[0]} ({platform.machine()})" if models else platform.machine()
     return f"{processor}, {os.cpu_count()} processors, {platform.system()}"
-
-
-def versions() -> dict[str, str]:
-    """Python's version and those of the packages that a result depends on."""
-    found = {"python": platform.python_version()}
-    for name in PACKAGES:
-        try:
-            found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            found[name] = "not installed as a package"
-    return found
 
 
 def commit(folder: Path) -> str | None:

@@ -19,6 +19,7 @@ from proxcgal.study.analysis import Summary, combined, static_summary, write_jso
 from proxcgal.study.pool import Pool, default_workers
 
 if TYPE_CHECKING:
+    from proxcgal.models import Robot
     from proxcgal.sim.scenario import Scenario
     from proxcgal.sim.trial import TrialLog
 
@@ -94,10 +95,22 @@ def perform(
     return summaries
 
 
-def check(scenario: Scenario, controllers: Sequence[str], *, quiet: bool = False) -> None:
+def check(
+    scenario: Scenario,
+    controllers: Sequence[str],
+    robot: Robot | None = None,
+    *,
+    quiet: bool = False,
+) -> None:
     """Sets everything up once, so that nothing is written where something does not fit.
 
     A robot that is new to this machine has its meshes prepared here, and kept for the workers.
+
+    Args:
+        scenario: to be set up.
+        controllers: so are these.
+        robot: the scenario's, where it is loaded already.
+        quiet: no word on stderr.
 
     Raises:
         ProxError: what of the scenario, the robot or the sensors cannot be.
@@ -106,7 +119,7 @@ def check(scenario: Scenario, controllers: Sequence[str], *, quiet: bool = False
     from proxcgal.sim.setup import Setup
 
     announce(f"setting up {scenario.name} (a robot's first time takes a while)", quiet=quiet)
-    setup = Setup.of(scenario)
+    setup = Setup.of(scenario, robot)
     for controller in controllers:
         setup.make_controller(controller)
     FaultInjector(scenario.faults, [mount.name for mount in setup.skin.mounts], scenario.seed)

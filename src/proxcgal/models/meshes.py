@@ -15,6 +15,8 @@ from proxcgal.models.triangles import Floats, Ints, compact, double_areas
 MAX_FACES = 5_000_000
 MAX_MESH_BYTES = 512 * 2**20
 SUFFIXES = (".stl", ".obj", ".dae", ".ply", ".off")
+# Farther from the origin nothing is looked for, and squares would leave single precision [m].
+FARTHEST = 1e9
 # Vertices closer than this are one [m].
 _WELD = 1e-7
 # A face whose doubled area is below this share of its longest side squared has none.
@@ -92,8 +94,14 @@ def clean(vertices: Floats, triangles: Ints, what: str) -> tuple[Floats, Ints, i
         vertices (v, 3), triangles (f, 3) and how many faces were left out.
 
     Raises:
-        GeometryError: no face has an area.
+        GeometryError: no face has an area, a vertex is farther than 1e9 m from the origin.
     """
+    if not (near := np.abs(vertices).max(axis=1) <= FARTHEST).all():
+        row = int(np.argmin(near))
+        raise GeometryError(
+            f"{what}: vertex {row} is {vertices[row].tolist()}; at most {FARTHEST:g} m from the "
+            "origin are taken"
+        )
     cell = np.round(vertices / _WELD).astype(np.int64)
     _, first, rows = np.unique(cell, axis=0, return_index=True, return_inverse=True)
     order = np.argsort(first)  # as in the file
@@ -131,10 +139,11 @@ def _read_obj(data: bytes, path: Path) -> tuple[Floats, Ints]:
                 raise GeometryError(
                     f"{path}, line {number}: a face with {len(rows)} corners; 3 are needed"
                 )
-            if min(rows) < 0:
+            if outside := [c for c, row in zip(corners, rows, strict=True)
+                           if not 0 <= row < MAX_MESH_BYTES]:  # fmt: skip
                 raise GeometryError(
-                    f"{path}, line {number}: face {len(faces)} has vertex "
-                    f"{corners[rows.index(min(rows))]}; {len(vertices)} are known there"
+                    f"{path}, line {number}: face {len(faces)} has vertex {outside[0]}; "
+                    f"{len(vertices)} are known there"
                 )
             faces += [(rows[0], rows[k], rows[k + 1]) for k in range(1, len(rows) - 1)]
             if len(faces) > MAX_FACES:
@@ -164,6 +173,9 @@ def _read_with_trimesh(data: bytes, path: Path) -> tuple[Floats, Ints]:
             unit = float(asset.get("meter", "1")) if asset is not None else 1.0
         except ValueError as error:
             raise GeometryError(str(error)) from None
+        if not 0 < unit <= FARTHEST:
+            raise GeometryError(f"{path}: its unit is {unit} m; more than 0 is needed, at most "
+                                f"{FARTHEST:g}")  # fmt: skip
     import trimesh  # here, because a warm cache does without it
 
     try:
@@ -172,10 +184,9 @@ def _read_with_trimesh(data: bytes, path: Path) -> tuple[Floats, Ints]:
         mesh = scene.to_mesh()
     except Exception as error:  # whatever a broken file makes the readers raise
         raise GeometryError(f"{path}: cannot be read as a mesh: {error!r}") from None
-    return (
-        np.asarray(mesh.vertices, dtype=np.float64).reshape(-1, 3) * unit,
-        np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3),
-    )
+    vertices = np.asarray(mesh.vertices, dtype=np.float64).reshape(-1, 3)
+    with np.errstate(over="ignore"):  # what overflows is refused as not finite
+        return vertices * unit, np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)
 
 
 def box(size: Floats) -> tuple[Floats, Ints]:

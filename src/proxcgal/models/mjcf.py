@@ -17,7 +17,7 @@ from proxcgal.errors import ModelError
 from proxcgal.models.description import listed
 from proxcgal.models.meshes import box, capsule, cylinder, ellipsoid
 from proxcgal.models.paths import MeshFolders
-from proxcgal.models.reading import WORLD, Shape, numbers
+from proxcgal.models.reading import WORLD, Shape, is_direction, numbers
 
 _NOT_READ = ("include", "frame", "replicate", "attach", "composite", "flexcomp", "plugin")
 _NUMBERS = {"pos": 3, "quat": 4, "axis": 3, "euler": 3, "xyaxes": 6, "zaxis": 3, "axisangle": 4}
@@ -87,8 +87,8 @@ def _check_body(body: ET.Element, names: set[str], path: Path) -> None:
                     f"{path}: <{element.tag}> '{element.get('name', '')}' in body '{name}', {key}"
                 )
                 values = numbers(element.get(key, ""), count, what)
-                if key in ("axis", "quat") and not values.any():
-                    raise ModelError(f"{what} is all zeros; a direction is needed")
+                if key in ("axis", "quat") and not is_direction(values):
+                    raise ModelError(f"{what} is all zeros, or nearly; a direction is needed")
     for joint in joints:
         if not joint.get("name"):
             raise ModelError(f"{path}: body '{name}' has a joint without a name")

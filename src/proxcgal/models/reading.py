@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,11 +12,13 @@ import numpy as np
 
 from proxcgal.errors import ModelError
 from proxcgal.models.description import Frame, Joint, Link, RobotDescription, listed
-from proxcgal.models.meshes import clean, load_mesh
+from proxcgal.models.meshes import FARTHEST, clean, load_mesh
 from proxcgal.models.triangles import Floats, Ints
 
 # The frame that the base stands in, where it has no link of its own.
 WORLD = "world"
+# An axis or quaternion shorter than this has no direction.
+_NO_DIRECTION = 1e-9
 # A tool frame by these names is taken where the user names none.
 TOOL_NAMES = ("tool0", "TCP", "tcp", "tool", "ee_link", "flange", "attachment_site")
 
@@ -30,17 +33,17 @@ class Shape:
     mesh: tuple[Floats, Ints] | None = None
 
 
-def number(text: str, what: str) -> float:
-    """One finite number.
+def number(text: str, what: str, most: float = FARTHEST) -> float:
+    """One finite number of at most that size.
 
     Raises:
         ModelError: it is none.
     """
-    return float(numbers(text, 1, what)[0])
+    return float(numbers(text, 1, what, most)[0])
 
 
-def numbers(text: str, count: int, what: str) -> Floats:
-    """So many finite numbers, as they stand in an XML attribute.
+def numbers(text: str, count: int, what: str, most: float = FARTHEST) -> Floats:
+    """So many finite numbers, as they stand in an XML attribute, each of at most that size.
 
     Raises:
         ModelError: they are not.
@@ -52,7 +55,14 @@ def numbers(text: str, count: int, what: str) -> Floats:
     if len(values) != count or not np.isfinite(values).all():
         finite = "a finite number is" if count == 1 else f"{count} finite numbers are"
         raise ModelError(f"{what} is '{text[:80]}'; {finite} needed")
+    if (np.abs(values) > most).any():
+        raise ModelError(f"{what} is '{text[:80]}'; at most {most:g} is taken")
     return values
+
+
+def is_direction(values: Floats) -> bool:
+    """Whether an axis or a quaternion says which way."""
+    return math.hypot(*values) > _NO_DIRECTION
 
 
 def build_link_mesh(
@@ -75,11 +85,12 @@ def build_link_mesh(
         else:
             assert part.mesh is not None
             points, faces = part.mesh
-        if part.scale is not None:
-            points = points * part.scale
-            if np.prod(part.scale) < 0:  # mirrored: turn the faces back
-                faces = faces[:, ::-1]
-        vertices.append(points @ part.pose[:3, :3].T + part.pose[:3, 3])
+        with np.errstate(over="ignore", invalid="ignore"):  # `clean` refuses what is not finite
+            if part.scale is not None:
+                points = points * part.scale
+                if np.prod(np.sign(part.scale)) < 0:  # mirrored: turn the faces back
+                    faces = faces[:, ::-1]
+            vertices.append(points @ part.pose[:3, :3].T + part.pose[:3, 3])
         triangles.append(faces + count)
         count += len(points)
     files = sorted({str(part.file) for part in parts if part.file})

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
 import warnings
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -102,6 +105,20 @@ class Robot(_core.Robot):
                 for link, mesh in zip(self._description.links, self._control, strict=True)
             }
         return self._hashes
+
+    @property
+    def digest(self) -> str:
+        """The same where joints, limits, tool, links and both meshes of each are the same."""
+        described = self._description
+        parts = [
+            [asdict(joint) for joint in described.joints],
+            [[link.name, link.joint, link.T_JL] for link in described.links],
+            asdict(described.tool_frame),
+            [mesh.deviation for mesh in self._control],
+            self.mesh_hashes,
+        ]
+        text = json.dumps(parts, default=lambda array: array.tolist())
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For workers in other processes."""

@@ -18,10 +18,11 @@ from proxcgal.errors import GeometryError, ModelError
 from proxcgal.models.description import listed
 from proxcgal.models.meshes import box, cylinder, ellipsoid
 from proxcgal.models.paths import MeshFolders
-from proxcgal.models.reading import Shape, number, numbers
+from proxcgal.models.reading import Shape, is_direction, number, numbers
 from proxcgal.models.triangles import Floats, Ints
 
 MAX_LINKS = 1000
+_AXIS = "1 0 0"  # where none is given
 _MOVING = {"revolute", "continuous", "prismatic"}
 _REFUSED = {
     "floating": "moves freely",
@@ -111,7 +112,7 @@ def _check_joint(element: ET.Element, name: str, path: Path) -> None:
             f"{what} follows joint '{mimic.get('joint')}' (mimic); joints that follow others are "
             "not read: make it fixed, or put the part on with attach_mesh"
         )
-    if np.linalg.norm(_axis(element, what)) < 1e-9:
+    if not is_direction(_axis(element, what)):
         raise ModelError(f"{what} has axis 0 0 0; a direction is needed")
     limit = element.find("limit")
     if limit is None:
@@ -119,7 +120,7 @@ def _check_joint(element: ET.Element, name: str, path: Path) -> None:
             raise ModelError(f"{what} is {kind} and has no <limit>; lower and upper are needed")
         return
     for key in ("lower", "upper", "velocity"):
-        number(limit.get(key, "0"), f"{what}, limit {key}")
+        number(limit.get(key, "0"), f"{what}, limit {key}", math.inf)
     lower, upper = (float(limit.get(key, "0")) for key in ("lower", "upper"))
     if kind != "continuous" and not lower < upper:
         raise ModelError(f"{what} has lower limit {lower} and upper limit {upper}; lower < upper")
@@ -135,11 +136,14 @@ def kinematics_only(root: ET.Element) -> str:
         for tag in ("origin", "parent", "child", "axis"):
             if (part := joint.find(tag)) is not None:
                 ET.SubElement(kept, tag, dict(part.attrib))
+                if tag == "axis":  # without numbers it is the default, not 0 0 0
+                    kept[-1].set("xyz", part.get("xyz", _AXIS))
         if joint.get("type") != "fixed":
             limit = joint.find("limit")
             given = {} if limit is None else limit.attrib
-            keys = ("lower", "upper", "velocity", "effort")
-            values = {key: given.get(key, "0") for key in keys if key in given or key[0] in "ve"}
+            # Speed and effort are not taken from pinocchio, whose parser would complain by itself.
+            values = {"velocity": "0", "effort": "0"}
+            values |= {key: value for key, value in given.items() if key in ("lower", "upper")}
             ET.SubElement(kept, "limit", values)
     return ET.tostring(out, encoding="unicode")
 
@@ -227,7 +231,7 @@ def _origin(element: ET.Element, what: str) -> Floats:
 
 def _axis(element: ET.Element, what: str) -> Floats:
     axis = element.find("axis")
-    return numbers("1 0 0" if axis is None else axis.get("xyz", "1 0 0"), 3, f"{what}, axis")
+    return numbers(_AXIS if axis is None else axis.get("xyz", _AXIS), 3, f"{what}, axis")
 
 
 def _name(element: ET.Element, tag: str, path: Path) -> str:

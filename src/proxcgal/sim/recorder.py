@@ -6,10 +6,8 @@ the checksum of the whole file before it, so that damage is found, wherever it i
 
 from __future__ import annotations
 
-import importlib.metadata
 import io
 import json
-import platform
 import warnings
 import zlib
 from collections.abc import Mapping, Sequence
@@ -26,6 +24,7 @@ from proxcgal.errors import ConfigError
 from proxcgal.sim import foxglove, packing
 from proxcgal.sim.scenario import Scenario
 from proxcgal.sim.ticks import Tick
+from proxcgal.sim.versions import versions
 
 Array = NDArray[np.float64]
 
@@ -50,7 +49,7 @@ class Settings:
     controller: str  #: one of CONTROLLERS
     seed: int
     meshes: Mapping[str, str]  #: SHA-256 of each link's two meshes
-    versions: Mapping[str, str] = field(default_factory=lambda: versions())
+    versions: Mapping[str, str] = field(default_factory=versions)
     known_points_W: Array | None = field(default=None, compare=False)  #: where the run uses them
     ticks: RecordedTicks = "all"
 
@@ -185,16 +184,6 @@ def settings_crc(content: Mapping[str, str]) -> str:
     """Checksum of the settings, which stand before any tick."""
     text = json.dumps({key: content[key] for key in sorted(content)})
     return str(zlib.crc32(text.encode()))
-
-
-def versions() -> dict[str, str]:
-    """What a result depends on, beside the scenario."""
-    packages = ("proxcgal", "numpy", "mujoco", "pin")
-    found = {name: importlib.metadata.version(name) for name in packages}
-    found |= {"python": platform.python_version(), "machine": platform.machine()}
-    source = importlib.metadata.distribution("proxcgal").read_text("direct_url.json")
-    commit = json.loads(source or "{}").get("vcs_info", {}).get("commit_id")
-    return found | ({"commit": commit} if commit else {})
 
 
 class _Checked:

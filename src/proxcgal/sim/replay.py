@@ -7,6 +7,8 @@ import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from proxcgal.errors import ConfigError
 from proxcgal.sim.loop import run_ticks
 from proxcgal.sim.recording import Recording
@@ -90,10 +92,11 @@ def recompute(
     begin = clock.perf_counter()
     again = Replay(recording, controller, overrides)
     ticks = list(again)
+    elapsed = np.arange(len(ticks), dtype=np.float64) * again.law.config.period
     return TrialLog.of(
         ticks, again.setup.robot, scenario=again.setup.scenario.name,
         controller=again.controller, seed=recording.settings.seed,
-        wall_s=clock.perf_counter() - begin,
+        wall_s=clock.perf_counter() - begin, elapsed=elapsed,
     )  # fmt: skip
 
 
@@ -109,7 +112,10 @@ def first_difference(recording: Recording) -> int | None:
 def recorded_log(recording: Recording) -> TrialLog:
     """The log of the run itself, as it was recorded."""
     settings = recording.settings
+    period = 1.0 / settings.scenario.simulation.control_hz
+    elapsed = np.arange(len(recording.ticks), dtype=np.float64) * period
     return TrialLog.of(
         recording.ticks, Setup.of(settings.scenario).robot, scenario=settings.scenario.name,
         controller=settings.controller, seed=settings.seed, wall_s=0.0,
+        elapsed=elapsed if settings.ticks == "all" else None,
     )  # fmt: skip

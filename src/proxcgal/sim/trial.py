@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from proxcgal import _core
 from proxcgal.models import Robot
@@ -25,6 +26,7 @@ from proxcgal.sim.world import World
 
 __all__ = ["CONTROLLERS", "TrialLog", "first_difference", "recompute", "run_trial"]
 
+Array = NDArray[np.float64]
 Progress = Callable[[float], None]
 
 
@@ -74,32 +76,34 @@ def run_trial(
         )  # fmt: skip
         log = _Log(recorder, setup.robot, scenario.simulation.sensor_hz)
     ticks: list[Tick] = []
+    period = law.config.period
     beat = max(round(0.1 * scenario.simulation.control_hz), 1)
     for given, result in run_ticks(source, law, faults, known):
         distance, link, own = (np.nan, "", np.nan) if truth is None else truth(given.q)
         leaked = 0 if known is not None else _leaked(law, source)
         ticks.append(Tick(given, result, TickTruth(distance, link, own, leaked)))
         if log is not None:
-            log.write(ticks[-1], law)
+            log.write(ticks[-1], (len(ticks) - 1) * period, law)
         if on_progress is not None and len(ticks) % beat == 0:
-            on_progress(min((given.time + law.config.period) / scenario.duration, 1.0))
+            on_progress(min(len(ticks) * period / scenario.duration, 1.0))
     if on_progress is not None:
         on_progress(1.0)
+    # Not the ticks' own time, which a fault may make jump.
+    elapsed = np.arange(len(ticks), dtype=np.float64) * period
     if truth is None:
-        ticks = _with_truth(ticks, setup)
+        ticks = _with_truth(ticks, elapsed, setup)
     return TrialLog.of(
         ticks, setup.robot, scenario=scenario.name, controller=controller, seed=seed,
-        wall_s=clock.perf_counter() - begin,
+        wall_s=clock.perf_counter() - begin, elapsed=elapsed,
         recording_failure=recorder.failure if recorder else None,
     )  # fmt: skip
 
 
-def _with_truth(ticks: Sequence[Tick], setup: Setup) -> list[Tick]:
+def _with_truth(ticks: Sequence[Tick], elapsed: Array, setup: Setup) -> list[Tick]:
     """The ticks with the true distances that the summary needs."""
-    time = np.array([tick.given.time for tick in ticks])
     q = np.array([tick.given.q for tick in ticks])
     asked = decisive_truth(
-        setup.robot, setup.scenario.obstacles, q, final_ticks(time), under=TOO_CLOSE
+        setup.robot, setup.scenario.obstacles, q, final_ticks(elapsed), under=TOO_CLOSE
     )
     return [
         replace(tick, truth=TickTruth(float(distance), link, float(own), tick.truth.leaked))
@@ -124,8 +128,8 @@ class _Log:
         self._hz = hz
         self._beats = -1
 
-    def write(self, tick: Tick, law: _core.Controller) -> None:
-        beats = int(np.floor(tick.given.time * self._hz + 1e-9))  # those of the scans
+    def write(self, tick: Tick, elapsed: float, law: _core.Controller) -> None:
+        beats = int(np.floor(elapsed * self._hz + 1e-9))  # those of the scans
         beat = beats > self._beats
         if beat:
             self._beats = beats

@@ -28,7 +28,8 @@ class TrialLog:
     controller: str
     seed: int
     wall_s: float  #: [s] what the run took
-    time: Array  #: (n,) [s]
+    time: Array  #: (n,) [s] the caller's clock, which a fault can make jump
+    elapsed: Array  #: (n,) [s] since the run began
     q: Array  #: (n, n_q)
     qd: Array  #: (n, n_q) commanded
     seen_m: Array  #: (n,) cloud to robot, inf where nothing is seen
@@ -59,12 +60,14 @@ class TrialLog:
         controller: str,
         seed: int,
         wall_s: float,
+        elapsed: Array | None = None,
         recording_failure: str | None = None,
     ) -> TrialLog:
-        """Puts ticks together."""
+        """Puts ticks together; without `elapsed` the caller's clock is believed."""
         given = [tick.given for tick in ticks]
         results = [tick.result for tick in ticks]
         truths = [tick.truth for tick in ticks]
+        time = np.array([g.time for g in given])
         tools = np.array([robot.tool_pose(g.q) for g in given]).reshape(-1, 4, 4)
         goals = np.array([g.goal for g in given]).reshape(-1, 4, 4)
         found = Counter(
@@ -76,7 +79,8 @@ class TrialLog:
             controller=controller,
             seed=seed,
             wall_s=wall_s,
-            time=np.array([g.time for g in given]),
+            time=time,
+            elapsed=time if elapsed is None else elapsed,
             q=np.array([g.q for g in given]).reshape(-1, robot.n_q),
             qd=np.array([r.qd for r in results]).reshape(-1, robot.n_q),
             seen_m=np.array([r.seen for r in results]),
@@ -100,7 +104,7 @@ class TrialLog:
 
     def summary(self) -> dict[str, float | int]:
         """The run's numbers, as experiments report them; distances in metres."""
-        ends = np.minimum(self.true_m, NOTHING)[final_ticks(self.time)]
+        ends = np.minimum(self.true_m, NOTHING)[final_ticks(self.elapsed)]
         return {
             "true_min_m": _least(self.true_m),
             "true_final_m": min(float(ends.mean()), NOTHING) if len(ends) else NOTHING,
@@ -113,9 +117,9 @@ class TrialLog:
         }
 
 
-def final_ticks(time: Array) -> NDArray[np.bool_]:
-    """(n,) true for the ticks that `true_final_m` is the mean of."""
-    return time >= time[-1:] - FINAL if len(time) else np.zeros(0, bool)
+def final_ticks(elapsed: Array) -> NDArray[np.bool_]:
+    """(n,) true for the ticks that `true_final_m` is the mean of; `elapsed` as in the log."""
+    return elapsed >= elapsed[-1:] - FINAL if len(elapsed) else np.zeros(0, bool)
 
 
 def _least(distances: Array) -> float:

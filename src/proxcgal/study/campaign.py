@@ -9,6 +9,7 @@ import re
 import shlex
 import time as clock
 import traceback
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -31,6 +32,7 @@ class Trial:
     overrides: tuple[str, ...] = ()  # and changed by
     controller: str
     seed: int
+    robot_digest: str | None = None  # of the robot that it was planned with
     tags: Mapping[str, Cell] = field(default_factory=dict)  # which one it is: columns of the table
 
     @property
@@ -69,6 +71,12 @@ class Campaign:
     perform: Perform  # of a module, so that workers find it
     columns: Sequence[str]  # names of the numbers that it gives
     notes: Mapping[str, Any] = field(default_factory=dict)  # on how the trials came about
+
+    def __post_init__(self) -> None:
+        """Raises: ConfigError: two trials of one name, which their recordings would share."""
+        (name, count), *_ = Counter(trial.name for trial in self.trials).most_common(1) or [("", 0)]
+        if count > 1:
+            raise ConfigError(f"campaign: {count} trials are called {name}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -124,8 +132,11 @@ def run_campaign(
         if on_done is not None:
             on_done(todo[row], outcome)
 
-    def lost(row: int) -> Outcome:
-        return Outcome(key=todo[row].key, error="its worker process died, twice (out of memory?)")
+    def lost(row: int, deaths: int) -> Outcome:
+        times = {1: "once", 2: "twice"}.get(deaths, f"{deaths} times")
+        return Outcome(
+            key=todo[row].key, error=f"its worker process died, {times} (out of memory?)"
+        )
 
     pool.run(
         [functools.partial(_attempt, campaign.perform, trial) for trial in todo],
@@ -142,10 +153,15 @@ def _attempt(perform: Perform, trial: Trial, report: Report) -> Outcome:
         row, error = perform(trial, report), None
     except StoppedError:
         raise
-    except ProxError as problem:
-        row, error = None, str(problem)
     except Exception as problem:
-        place = traceback.extract_tb(problem.__traceback__)[-1]
-        at = f"{place.filename.rpartition('/')[2]}:{place.lineno}"
-        row, error = None, f"{type(problem).__name__}: {problem} ({at})"
+        row, error = None, told(problem)
     return Outcome(key=trial.key, row=row, error=error, wall_s=clock.perf_counter() - begin)
+
+
+def told(problem: Exception) -> str:
+    """What went wrong; with the place where nobody meant it to."""
+    if isinstance(problem, ProxError):
+        return str(problem)
+    place = traceback.extract_tb(problem.__traceback__)[-1]
+    at = f"{place.filename.rpartition('/')[2]}:{place.lineno}"
+    return f"{type(problem).__name__}: {problem} ({at})"

@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import Any
 
 from proxcgal.errors import ConfigError
-from proxcgal.sim.recorder import versions
+from proxcgal.sim.versions import versions
 
 CONNECT_S = 10.0  # [s] in which a scheduler has to answer
 
@@ -38,7 +38,7 @@ class Cluster:
         for name in ("distributed", "distributed.client"):
             logging.getLogger(name).setLevel(logging.CRITICAL)  # what it means, we tell in a line
         self.address = address
-        #: What a job that kills every worker it is given to ends as.
+        #: What a job ends as that workers died with, whether they ran it or had it in their queue.
         self.killed: type[Exception] = distributed.KilledWorker
         try:
             self._client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
@@ -58,8 +58,17 @@ class Cluster:
         """Gives up what still runs there, and leaves; the scheduler goes on."""
         self._client.close()
 
+    def deaths(self, killed: BaseException) -> int:
+        """How many workers died before the scheduler gave a job up."""
+        return int(getattr(killed, "allowed_failures", 0)) + 1
+
     def _compare(self) -> None:
         """Workers that came later are not asked; each is another machine's own business."""
+        if not self._client.scheduler_info()["workers"]:
+            raise ConfigError(
+                f"--cluster {self.address}: has no workers; start some with "
+                f"`dask worker {self.address} --nthreads 1`"
+            )
         try:
             found: dict[str, dict[str, str]] = self._client.run(versions)
         except Exception as error:

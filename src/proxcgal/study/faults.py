@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,13 +13,14 @@ from proxcgal.errors import ConfigError
 from proxcgal.sim.scenario import load_scenario
 from proxcgal.sim.setup import Setup
 from proxcgal.study.analysis import Summary
-from proxcgal.study.campaign import Campaign, Trial
+from proxcgal.study.campaign import Campaign, Trial, plain
 from proxcgal.study.fault_rows import DEGRADED, HOLD, MODES, ROWS, RUN, STOP, Row
 from proxcgal.study.figures import DPI, GREY
 from proxcgal.study.kind import Kind, Listing, Wishes
-from proxcgal.study.trials import robot_of, simulate
+from proxcgal.study.trials import identity, robot_of, simulate
 
 if TYPE_CHECKING:
+    from proxcgal.sim.scenario import Scenario
     from proxcgal.sim.trial import TrialLog
     from proxcgal.study.jobs import Report
     from proxcgal.study.store import Row as Numbers
@@ -34,6 +34,7 @@ COLUMNS = (
     "right", "latency_ms", "reached", "worst_mode", "told", "recovered", "same_commands",
     "qd_max", "true_min_m",
 )  # fmt: skip
+TICK_MS = 10  # a fault is answered at the next tick
 _SLACK = 1e-9  # [s] a tick at the bound is in time
 _ROW_OF = {row.name: row for row in ROWS}
 
@@ -45,9 +46,16 @@ def plan(wishes: Wishes) -> Campaign:
         ProxError: a scene that does not load, or whose sensors do not fit the rows.
     """
     trials: list[Trial] = []
+    scenes: dict[str, str] = {}
+    robots: set[str] = set()
     for source in wishes.scenarios or SCENES:
         base = load_scenario(source, (*SET, *wishes.overrides))
-        sensors = len(Setup.of(base, robot_of(base)).skin)
+        robot = robot_of(base)
+        sensors = len(Setup.of(base, robot).skin)
+        if plain(base.robot) in robots:  # the table is read by robot
+            raise ConfigError(f"--scenario {source}: there is another one with {base.robot}")
+        robots.add(plain(base.robot))
+        scenes |= identity(base, robot)
         for place, row in enumerate(ROWS):
             for number in range(wishes.runs):
                 draw = np.random.default_rng([wishes.seed, number, place])
@@ -59,6 +67,7 @@ def plan(wishes: Wishes) -> Campaign:
                     Trial(
                         scenario=load_scenario(source, overrides), source=source,
                         overrides=overrides, controller="wb", seed=wishes.seed + number,
+                        robot_digest=robot.digest,
                         tags={"robot": base.robot, "row": row.name, "run": number},
                     )
                 )  # fmt: skip
@@ -66,7 +75,7 @@ def plan(wishes: Wishes) -> Campaign:
         raise ConfigError("--runs: no trial is left")
     description = {
         "kind": "faults", "seed": wishes.seed, "scenarios": list(wishes.scenarios or SCENES),
-        "set": list(wishes.overrides),
+        "set": list(wishes.overrides), **scenes,
     }  # fmt: skip
     return Campaign(description=description, trials=trials, perform=perform, columns=COLUMNS)
 
@@ -86,9 +95,9 @@ def _assignment(faults: Any, start: float, end: float) -> str:
 def perform(trial: Trial, report: Report) -> Numbers:
     """One trial beside its row's requirements."""
     row = _ROW_OF[str(trial.tags["row"])]
-    log = simulate(trial.scenario, trial.controller, trial.seed, report)
+    log = _simulate(trial, trial.scenario, report)
     # By ticks, because the caller's clock may be what jumps.
-    time = np.arange(len(log.mode)) / trial.scenario.simulation.control_hz
+    time = log.elapsed
     onset = trial.scenario.faults[0].start
     after = time >= onset
     reached = after & (log.mode >= row.least)
@@ -98,7 +107,7 @@ def perform(trial: Trial, report: Report) -> Numbers:
     recovered = row.least == STOP or bool((log.mode[free] == RUN).all())
     told = not row.finding or log.findings.get(row.finding, 0) > 0
     same = not row.same_commands or _same_commands(trial, log, report)
-    in_time = row.least == RUN or latency <= row.within + 0.01 + _SLACK  # the tick it falls into
+    in_time = row.least == RUN or latency <= row.within + TICK_MS / 1000.0 + _SLACK
     right = in_time and worst <= row.most and told and recovered and same
     return {
         "right": bool(right and np.isfinite(log.qd).all()),
@@ -115,9 +124,12 @@ def perform(trial: Trial, report: Report) -> Numbers:
 
 def _same_commands(trial: Trial, log: TrialLog, report: Report) -> bool:
     """Are the commands those of the same trial without the fault, to the bit?"""
-    healthy = replace(trial, scenario=trial.scenario.model_copy(update={"faults": ()}))
-    other = simulate(healthy.scenario, trial.controller, trial.seed, report)
+    other = _simulate(trial, trial.scenario.model_copy(update={"faults": ()}), report)
     return log.qd.tobytes() == other.qd.tobytes()
+
+
+def _simulate(trial: Trial, scenario: Scenario, report: Report) -> TrialLog:
+    return simulate(scenario, trial.controller, trial.seed, report, robot_digest=trial.robot_digest)
 
 
 def analyse(table: pl.DataFrame, campaign: Campaign) -> Summary:
@@ -148,7 +160,7 @@ def listings(summary: Summary) -> list[Listing]:
     for robot, rows in summary["robots"].items():
         for name, found in rows.items():
             row = _ROW_OF[name]
-            bound = f"{1000 * row.within:.0f}" if row.least > RUN else "-"
+            bound = f"{1000 * row.within:.0f} + {TICK_MS}" if row.least > RUN else "-"
             lines.append(
                 (
                     name, robot, _required(row), str(found["runs"]), str(found["right"]),

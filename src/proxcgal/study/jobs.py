@@ -39,9 +39,13 @@ class Progress:
 
     def report(self, job: int, share: float) -> None:
         """Notes the share done; raises `StoppedError` where the run is to end."""
-        self._shares[1 + job] = share
+        self.note(job, share)
         if self._shares[_STOP_SLOT]:
             raise StoppedError
+
+    def note(self, job: int, share: float) -> None:
+        """Notes the share done, for those who are not to stop."""
+        self._shares[1 + job] = share
 
     def stop(self) -> None:
         """Tells all jobs to stop at their next report."""

@@ -8,17 +8,15 @@ from __future__ import annotations
 import os
 import tempfile
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import (
-    ALL_COMPLETED,
     FIRST_COMPLETED,
     BrokenExecutor,
     CancelledError,
-    Executor,
     Future,
     wait,
 )
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -47,9 +45,8 @@ class Pool:
         Raises:
             ConfigError: no such scheduler, or its workers have another proxcgal.
         """
-        self._workers = workers
+        self._workers = [_Worker() for _ in range(workers)]
         self._cluster = None if cluster is None else Cluster(cluster)
-        self._local: Any = None
 
     def __enter__(self) -> Self:
         """The pool itself."""
@@ -62,8 +59,8 @@ class Pool:
         trace: TracebackType | None,
     ) -> None:
         """Waits for the workers to end; those of a cluster go on without us."""
-        if self._local is not None:
-            self._local.shutdown(wait=True)
+        for worker in self._workers:
+            worker.close()
         if self._cluster is not None:
             self._cluster.close()
 
@@ -72,18 +69,19 @@ class Pool:
         jobs: Sequence[Job],
         on_progress: Callable[[list[float]], None] | None = None,
         on_done: Callable[[int, Any], None] | None = None,
-        on_lost: Callable[[int], Any] | None = None,
+        on_lost: Callable[[int, int], Any] | None = None,
     ) -> list[Any]:
         """All jobs' results, in the jobs' order.
 
-        A job whose worker died is repeated once, alone, so that nobody else is blamed for it; a
-        cluster does so by itself.
+        A job whose worker died is repeated once. A cluster does so by itself, and what it gives up
+        is given to it once more, alone, so that no job is blamed for another.
 
         Args:
             jobs: each is called with a function that takes its share done.
             on_progress: called with all jobs' shares, now and then.
             on_done: called with a job's row and result, as each ends.
-            on_lost: called with the row of a job that killed its worker again; gives its result.
+            on_lost: called with the row of a job that killed its worker again, and how many workers
+                died with it; gives its result.
 
         Raises:
             SimulationError: a worker died (killed, or out of memory) and nobody asked `on_lost`.
@@ -97,25 +95,44 @@ class Pool:
             )  # fmt: skip
             if self._cluster is not None:
                 run.far(self._cluster)
-            elif self._workers > 1:
-                run.near(self._workers, self._processes)
+            elif len(self._workers) > 1:
+                run.near(self._workers)
             else:
                 run.here()
             return run.results
 
-    def _processes(self, anew: bool) -> Executor:
-        """The local workers; `anew`: others in place of these, which are broken."""
-        if anew and self._local is not None:
-            self._local.shutdown(wait=True, kill_workers=True)
-            self._local = None
-        if self._local is None:
-            from joblib.externals.loky import ProcessPoolExecutor  # 0.1 s
 
-            self._local = ProcessPoolExecutor(
-                self._workers, initializer=end_with, initargs=(os.getpid(),)
-            )
-        executor: Executor = self._local
-        return executor
+class _Worker:
+    """One process, that comes to life with its first job, and again when it was killed.
+
+    One process an executor: whose job a dead one had is then known.
+    """
+
+    def __init__(self) -> None:
+        self._process: Any = None
+
+    def submit(self, *arguments: Any) -> Future[Any]:
+        """Gives it a job, as `work` takes it, when it has none."""
+        while True:
+            if self._process is None:
+                from joblib.externals.loky import ProcessPoolExecutor  # 0.1 s
+
+                self._process = ProcessPoolExecutor(
+                    1, initializer=end_with, initargs=(os.getpid(),)
+                )
+            try:
+                with interrupts_blocked():  # the process inherits it
+                    future: Future[Any] = self._process.submit(work, *arguments)
+            except BrokenExecutor:  # killed since its last job
+                self._process.shutdown(wait=True, kill_workers=True)
+                self._process = None
+            else:
+                return future
+
+    def close(self) -> None:
+        """Waits for it to end."""
+        if self._process is not None:
+            self._process.shutdown(wait=True)
 
 
 class _Run:
@@ -127,7 +144,7 @@ class _Run:
         path: Path,
         tell: Callable[[list[float]], None],
         done: Callable[[int, Any], None],
-        lost: Callable[[int], Any],
+        lost: Callable[[int, int], Any],
     ) -> None:
         self._jobs = jobs
         self._path = path
@@ -146,95 +163,94 @@ class _Run:
 
             self._take(row, job(report))
 
-    def near(self, workers: int, executor: Callable[[bool], Executor]) -> None:
-        """On worker processes; `executor` gives them, new ones where the others are broken.
-
-        Never more jobs under way than workers, so that it is known which a dead one had. Whoever
-        had one is suspected, and goes on alone.
-        """
-        waiting, suspects = deque(range(len(self._jobs))), deque[int]()
-        suspected: set[int] = set()
+    def near(self, workers: Sequence[_Worker]) -> None:
+        """On worker processes, one job each: a job whose worker died is repeated once."""
+        waiting, died = deque(range(len(self._jobs))), set[int]()
+        idle, busy = list(workers), dict[Future[Any], _Worker]()
         with self._stopped():
-            while waiting or suspects or self._running:
-                alone = bool(suspects) or not suspected.isdisjoint(self._running.values())
-                broken = False
-                while (suspects or waiting) and len(self._running) < (1 if alone else workers):
-                    if broken := not self._submit(executor(False), (suspects or waiting)[0]):
-                        break
-                    (suspects or waiting).popleft()
-                dead = self._collect(POLL_S, BrokenExecutor)
-                if dead or broken:  # one dead worker takes all the others with it
-                    dead += self._collect(None, BrokenExecutor)
-                    executor(True)
-                for row in dead:
-                    if row in suspected:
-                        self._take(row, self._lost(row))
+            while waiting or self._running:
+                while waiting and idle:
+                    row, worker = waiting.popleft(), idle.pop()
+                    future = worker.submit(self._jobs[row], str(self._path), row)
+                    self._running[future], busy[future] = row, worker
+                for row in self._collect(BrokenExecutor):
+                    if row in died:
+                        self._take(row, self._lost(row, 2))
                     else:
-                        suspects.append(row)
-                        suspected.add(row)
+                        died.add(row)
+                        waiting.appendleft(row)
+                idle += [busy.pop(future) for future in list(busy.keys() - self._running.keys())]
 
     def far(self, cluster: Cluster) -> None:
-        """On a cluster, which queues them and repeats those of dead workers itself."""
+        """On a cluster, which queues them and repeats those of dead workers itself.
+
+        It also gives up jobs that only waited in the queues of dead workers: each of those is
+        given to it once more, with no other job of ours beside it.
+        """
         with self._stopped():
-            for row, job in enumerate(self._jobs):
-                self._running[cluster.executor.submit(work_far, job)] = row
-            while self._running:
-                try:
-                    dead = self._collect(POLL_S, cluster.killed)
-                except (CancelledError, ImportError) as error:  # gone, or a worker without us
-                    reason = str(error) or "it is gone"
-                    raise SimulationError(
-                        f"--cluster {cluster.address}: lost on the way: {reason}"
-                    ) from None
-                for row in dead:
-                    self._take(row, self._lost(row))
+            for row in self._far(cluster, range(len(self._jobs))):
+                for again, killed in self._far(cluster, [row]).items():
+                    self._take(again, self._lost(again, cluster.deaths(killed)))
 
-    def _submit(self, executor: Executor, row: int) -> bool:
-        """Gives a job to the workers; false where one of them died meanwhile."""
-        try:
-            with interrupts_blocked():  # workers inherit it
-                future = executor.submit(work, self._jobs[row], str(self._path), row)
-        except BrokenExecutor:
-            return False
-        self._running[future] = row
-        return True
+    def _far(self, cluster: Cluster, rows: Iterable[int]) -> dict[int, BaseException]:
+        """These jobs on a cluster; those that it gave up."""
+        for row in rows:
+            self._running[cluster.executor.submit(work_far, self._jobs[row])] = row
+        given_up: dict[int, BaseException] = {}
+        while self._running:
+            try:
+                given_up |= self._collect(cluster.killed)
+            except (CancelledError, ImportError) as error:  # gone, or a worker without us
+                reason = str(error) or "it is gone"
+                raise SimulationError(
+                    f"--cluster {cluster.address}: lost on the way: {reason}"
+                ) from None
+        return dict(sorted(given_up.items()))
 
-    def _collect(self, timeout: float | None, died: type[BaseException]) -> list[int]:
-        """Takes what ended meanwhile (no timeout: all); the rows of those whose worker died."""
-        until = FIRST_COMPLETED if timeout else ALL_COMPLETED
-        ended, _ = wait(self._running, timeout, until)
+    def _collect(self, died: type[BaseException]) -> dict[int, BaseException]:
+        """Takes what ended meanwhile; the rows of those whose worker died."""
+        ended, _ = wait(self._running, POLL_S, FIRST_COMPLETED)
         self._tell(self._progress.shares())
-        dead = []
+        dead = {}
         for future in ended:
-            row = self._running.pop(future)
+            row = self._running[future]
             try:
                 result = future.result()
-            except died:
-                dead.append(row)
+            except died as error:
+                dead[row] = error
             else:
                 self._take(row, result)
-        return sorted(dead)
+            del self._running[future]  # not before: what is interrupted here is taken again
+        return dead
 
     def _take(self, row: int, result: Any) -> None:
         self.results[row] = result
-        self._progress.report(row, 1.0)
+        self._progress.note(row, 1.0)
         self._tell(self._progress.shares())
         self._done(row, result)
 
     @contextmanager
     def _stopped(self) -> Iterator[None]:
-        """Whatever goes wrong: all jobs are told to stop, and those on this machine waited for."""
+        """Whatever goes wrong: all jobs are told to stop, and those on this machine waited for.
+
+        What ended with a result all the same is taken.
+        """
         try:
             yield
         except BaseException:
             self._progress.stop()
             for future in self._running:
                 future.cancel()
-            wait([future for future in self._running if not future.cancelled()])
+            left = {f: row for f, row in self._running.items() if not f.cancelled()}
+            wait(left)
+            with suppress(Exception):  # what went wrong first is told
+                for future, row in left.items():
+                    if future.exception() is None:
+                        self._take(row, future.result())
             raise
 
 
-def _died(row: int) -> Any:
+def _died(row: int, deaths: int) -> Any:
     raise SimulationError(
         "a worker process died (killed, or out of memory); --workers 1 needs least memory"
     )

@@ -19,13 +19,13 @@ from proxcgal.study.analysis import (
     Summary,
 )
 from proxcgal.study.bootstrap import median_interval
-from proxcgal.study.campaign import Campaign, Trial
+from proxcgal.study.campaign import Campaign, Trial, plain
 from proxcgal.study.draws import draw_scene
 from proxcgal.study.jobs import Report
 from proxcgal.study.kind import Kind, Wishes
 from proxcgal.study.static_words import captions, figures, listings, verdicts
 from proxcgal.study.store import Row
-from proxcgal.study.trials import robot_of, simulate
+from proxcgal.study.trials import identity, robot_of, simulate
 
 SCENES = ("front_plane", "side_plane")
 #: Of the trials under 0.05 m: the cloud's nearest point was this much farther away than the panel
@@ -44,6 +44,7 @@ def plan(wishes: Wishes) -> Campaign:
     """
     trials: list[Trial] = []
     redrawn: dict[str, dict[str, int]] = {}
+    scenes: dict[str, str] = {}
     sources = wishes.scenarios or SCENES
     if "seed" in (assignment.partition("=")[0].strip() for assignment in wishes.overrides):
         raise ConfigError("--set seed=...: every draw has its own; --seed fixes them all")
@@ -51,8 +52,9 @@ def plan(wishes: Wishes) -> Campaign:
         base = load_scenario(source, wishes.overrides)
         robot = robot_of(base)
         Setup.of(base, robot)  # tells what does not fit before anything is drawn
-        if base.name in redrawn:
-            raise ConfigError(f"--scenario {source}: there is another one named {base.name}")
+        if plain(base.name) in map(plain, redrawn):
+            raise ConfigError(f"--scenario {source}: there is another one named {plain(base.name)}")
+        scenes |= identity(base, robot)
         reasons: Counter[str] = Counter()
         for number in range(wishes.runs):
             draw = draw_scene(base, robot, wishes.seed, number)
@@ -61,14 +63,15 @@ def plan(wishes: Wishes) -> Campaign:
                 Trial(
                     scenario=draw.scenario, source=source,
                     overrides=(*wishes.overrides, *draw.overrides), controller=controller,
-                    seed=wishes.seed + number, tags={"scene": base.name, "draw": number},
+                    seed=wishes.seed + number, robot_digest=robot.digest,
+                    tags={"scene": base.name, "draw": number},
                 )
                 for controller in CONTROLLERS
             ]  # fmt: skip
         redrawn[base.name] = dict(sorted(reasons.items()))
     description = {
         "kind": "static", "seed": wishes.seed, "scenarios": list(sources),
-        "set": list(wishes.overrides),
+        "set": list(wishes.overrides), **scenes,
     }  # fmt: skip
     return Campaign(
         description=description, trials=trials, perform=perform, columns=_columns(trials[0]),
@@ -78,7 +81,9 @@ def plan(wishes: Wishes) -> Campaign:
 
 def perform(trial: Trial, report: Report) -> Row:
     """One trial's numbers, beside what was drawn for it."""
-    log = simulate(trial.scenario, trial.controller, trial.seed, report)
+    log = simulate(
+        trial.scenario, trial.controller, trial.seed, report, robot_digest=trial.robot_digest
+    )
     numbers = log.summary()
     row: Row = {key: numbers[key] for key in CONTROLLER_KEYS}
     nearest = int(np.nanargmin(log.true_m))

@@ -44,6 +44,8 @@ def listings(summary: Summary) -> list[Listing]:
     ]  # fmt: skip
 
 
+ENOUGH = 6  # draws: of fewer, a resampled interval is no more than their range
+
 _COMPARISONS = {"gain_mm": "gain, wb - sm", "sensing_cost_mm": "sensing, wb_known - wb"}
 
 
@@ -74,11 +76,9 @@ def verdicts(summary: Summary) -> list[str]:
     for scene, found in summary["scenes"].items():
         gain, cost = found["gain_mm"], found["sensing_cost_mm"]
         if gain is not None:
-            sure = gain["low"] > 0.0 or gain["high"] < 0.0
             text = (
                 f"{scene}: wb ends {gain['median']:+.0f} mm farther away than sm in the median "
-                f"(95 % interval {gain['low']:+.0f} to {gain['high']:+.0f} mm, which "
-                f"{'excludes' if sure else 'includes'} 0)"
+                f"({_sureness(gain)})"
             )
             if cost is not None:
                 text += f"; sensing costs wb {cost['median']:.0f} mm against a known scene"
@@ -99,6 +99,16 @@ def verdicts(summary: Summary) -> list[str]:
             "are counted all the same: no law here avoids the own arm."
         )
     return told
+
+
+def _sureness(paired: Summary) -> str:
+    if paired["pairs"] < ENOUGH:
+        return f"{paired['pairs']} draws: too few to say how sure that is"
+    sure = paired["low"] > 0.0 or paired["high"] < 0.0
+    return (
+        f"95 % interval {paired['low']:+.0f} to {paired['high']:+.0f} mm, which "
+        f"{'excludes' if sure else 'includes'} 0"
+    )
 
 
 def figures(table: pl.DataFrame) -> dict[str, Figure]:

@@ -15,7 +15,7 @@ from typing import Any, Self
 from proxcgal.errors import ConfigError
 from proxcgal.study.analysis import write_json
 
-MANIFEST, TRIALS = "campaign.json", "trials"
+MANIFEST, TRIALS, SUMMARY = "campaign.json", "trials", "summary.json"
 
 Cell = str | int | float | bool | None
 Row = dict[str, Cell]
@@ -46,23 +46,31 @@ class Store:
             description: what makes it this campaign, as plain JSON values.
 
         Raises:
-            ConfigError: the folder holds another campaign, another process works in it, or it
-                cannot be written.
+            ConfigError: the folder holds another campaign or other results, another process works
+                in it, or it cannot be written.
         """
         self._trials = folder / TRIALS
+        with contextlib.ExitStack() as opened:
+            try:
+                folder.mkdir(parents=True, exist_ok=True)
+                self._lock = os.open(folder, os.O_RDONLY)
+                opened.callback(os.close, self._lock)
+                self._open(folder, description)
+            except OSError as error:
+                raise ConfigError(
+                    f"--out {folder}: cannot be written: {error.strerror or error}"
+                ) from None
+            opened.pop_all()
+
+    def _open(self, folder: Path, description: Mapping[str, Any]) -> None:
+        """Nobody else can come between what is found there and what is made of it."""
+        _lock(self._lock, folder)
         _refuse_other(folder, description)
-        try:
-            self._trials.mkdir(parents=True, exist_ok=True)
-            self._lock = os.open(self._trials, os.O_RDONLY)
-            _lock(self._lock, folder)
-            for half in self._trials.glob(".*"):  # of a process that was killed
-                half.unlink()
-            if not (folder / MANIFEST).is_file():
-                write_json(folder / MANIFEST, description)
-        except OSError as error:
-            raise ConfigError(
-                f"--out {folder}: cannot be written: {error.strerror or error}"
-            ) from None
+        self._trials.mkdir(exist_ok=True)
+        for half in self._trials.glob(".*"):  # of a process that was killed
+            half.unlink()
+        if not (folder / MANIFEST).is_file():
+            write_json(folder / MANIFEST, description)
 
     def __enter__(self) -> Self:
         """The store itself."""
@@ -111,6 +119,11 @@ def read_description(folder: Path) -> dict[str, Any] | None:
 def _refuse_other(folder: Path, description: Mapping[str, Any]) -> None:
     there = read_description(folder)
     here = json.loads(json.dumps(description))
+    if there is None and (folder / SUMMARY).exists():
+        raise ConfigError(
+            f"--out {folder}: holds results of something else ({SUMMARY} without {MANIFEST}); "
+            "name another folder, or remove that one"
+        )
     if there is None or there == here:
         return
     lines = [

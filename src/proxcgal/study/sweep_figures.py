@@ -83,7 +83,8 @@ def _legend(cells: Sequence[Cell]) -> list[Line2D]:
     """A row of clouds with their sizes above a row of methods, column by column."""
     clouds = []
     for cloud, colour in CLOUD_COLOURS.items():
-        sizes = sorted({cell.points for cell in cells if cell.cloud == cloud})
+        own = sorted((c for c in cells if c.cloud == cloud), key=lambda c: c.robot)
+        sizes = list(dict.fromkeys(cell.points for cell in own))  # as the panels stand
         if sizes:
             label = f"{CLOUD_NAMES[cloud]}: {' and '.join(map(str, sizes))} points"
             clouds.append(Line2D([], [], color=colour, linewidth=3.0, label=label))

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from proxcgal.errors import ModelWarning
+from proxcgal.errors import ConfigError, ModelWarning
 from proxcgal.sim.recorder import RecordedTicks, Recorder
 from proxcgal.sim.setup import make_robot
 from proxcgal.sim.trial import run_trial
@@ -29,6 +30,7 @@ def simulate(
     *,
     recording: Path | None = None,
     ticks: RecordedTicks = "all",
+    robot_digest: str | None = None,
 ) -> TrialLog:
     """Runs a trial in a worker process.
 
@@ -39,16 +41,17 @@ def simulate(
         report: is told the share done.
         recording: where to record to; without, true distances are asked only where they decide.
         ticks: which of them the recording holds.
+        robot_digest: of the robot that it must be; left out: any.
 
     Raises:
-        ProxError: what of the scenario does not fit; the simulator warned.
+        ProxError: what of the scenario does not fit, another robot; the simulator warned.
     """
     with warnings.catch_warnings():
         # What there is to say of a model was said when the set-up was checked, and a recording
         # that stops early is in the log.
         warnings.simplefilter("ignore", ModelWarning)
         warnings.simplefilter("ignore", RuntimeWarning)
-        robot = robot_of(scenario)
+        robot = robot_of(scenario, robot_digest)
         if recording is None:
             return run_trial(
                 scenario, controller, seed=seed, robot=robot, on_progress=report, sparse_truth=True
@@ -59,13 +62,37 @@ def simulate(
             )
 
 
-def robot_of(scenario: Scenario) -> Robot:
-    """The scenario's robot, loaded once a process. Raises: ConfigError, ModelError."""
+def robot_of(scenario: Scenario, digest: str | None = None) -> Robot:
+    """The scenario's robot, loaded once a process, and again where its files changed since.
+
+    Args:
+        scenario: whose robot.
+        digest: of the robot that it must be; left out: any.
+
+    Raises:
+        ConfigError: it is another robot here.
+        ModelError: its description.
+    """
     settings = (
         scenario.robot, scenario.package_dirs, scenario.vertices_per_link, scenario.limits
     )  # fmt: skip
+    if settings in _robots and digest not in (None, _robots[settings].digest):
+        del _robots[settings]  # of an earlier campaign, in a worker that lives on
     if settings not in _robots:
         while len(_robots) >= _KEPT:
             _robots.pop(next(iter(_robots)))
         _robots[settings] = make_robot(scenario)
-    return _robots[settings]
+    robot = _robots[settings]
+    if digest not in (None, robot.digest):
+        raise ConfigError(
+            f"scenario {scenario.name}: robot {scenario.robot} is another one here "
+            f"({robot.digest}) than where the campaign was planned ({digest}): its joints, limits "
+            "or meshes differ"
+        )
+    return robot
+
+
+def identity(base: Scenario, robot: Robot) -> dict[str, str]:
+    """What a campaign's description says of a scene that its trials are made from."""
+    scene = hashlib.sha256(base.to_toml().encode()).hexdigest()[:16]
+    return {f"scene {base.name}": scene, f"robot of {base.name}": robot.digest}
