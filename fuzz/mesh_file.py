@@ -1,0 +1,25 @@
+"""Fuzz target: mesh files, from the file to what distances are asked of.
+
+The first byte chooses the format, the rest is the file.
+"""
+
+from __future__ import annotations
+
+import collada  # noqa: F401  loaded here: imports are no part of what a call may take
+import trimesh  # noqa: F401
+from bounds import promises
+from places import folder
+
+from proxcgal import MeshTree
+from proxcgal.models.meshes import SUFFIXES, clean, load_mesh
+
+
+def once(data: bytes) -> None:
+    """Reads a mesh from these bytes; raises where a promise is broken."""
+    if not data:
+        return
+    path = folder() / f"mesh{SUFFIXES[data[0] % len(SUFFIXES)]}"
+    path.write_bytes(data[1:])
+    with promises():
+        vertices, triangles, _ = clean(*load_mesh(path), str(path))
+        MeshTree(vertices, triangles).closest([[0.1, 0.2, 0.3]])
