@@ -410,3 +410,14 @@ def test_numbers_of_a_replay_are_those_of_the_run(results: Path) -> None:
     least = min(tick.truth.distance for tick in ticks)
     assert summary["controllers"]["sm"]["true_min_m"] == least
     assert np.isfinite(least)
+
+
+def test_a_campaigns_folder_is_not_written_over(call: Call, tmp_path: Path) -> None:
+    folder = tmp_path / "campaign"
+    folder.mkdir()
+    (folder / "campaign.json").write_text("{}")
+    for command in (["sweep", "--quick"], ["run", "front_plane", *QUICK]):
+        answer = call(*command, "--out", folder)
+        assert answer.code == 2
+        assert "holds a campaign" in answer.err
+    assert [path.name for path in folder.iterdir()] == ["campaign.json"]

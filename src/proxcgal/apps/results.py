@@ -145,8 +145,16 @@ def ready(folders: Sequence[Path]) -> list[Path]:
         The folders that were not there before, innermost last.
 
     Raises:
-        ConfigError: a folder cannot be made or written; none is left behind that was not there.
+        ConfigError: a folder cannot be made or written, or holds a campaign; none is left behind
+            that was not there.
     """
+    from proxcgal.study.store import MANIFEST
+
+    for folder in folders:
+        if (folder / MANIFEST).exists():
+            raise ConfigError(
+                f"--out {folder}: holds a campaign; name another folder, or remove it"
+            )
     made: list[Path] = []
     try:
         for folder in folders:

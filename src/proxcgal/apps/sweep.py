@@ -63,10 +63,10 @@ def sweep_command(options: SweepOptions, command: str) -> int:
 
     scenarios = [load_scenario(name) for name in options.scenario]
     vertices, clouds = (QUICK_VERTICES, QUICK_CLOUDS) if options.quick else (VERTICES, tuple(REACH))
-    grids = _prepare(scenarios, vertices, clouds, options.quiet)
     about = origin(command)
     made = ready([options.out])
     try:
+        grids = _prepare(scenarios, vertices, clouds, options.quiet)
         cells = _measure(grids, QUICK if options.quick else FULL, options.quiet)
         summary = sweep_summary(cells, machine())
         files = {f"{scenario.name}.toml": scenario.to_toml().encode() for scenario in scenarios}
