@@ -140,6 +140,24 @@ Points zone_directions(const SensorModel& model) {
   return directions;
 }
 
+/// What one packet says, zone by zone: (zones, points, ranges, standard deviations).
+std::tuple<Eigen::VectorXi, Points, Eigen::VectorXd, Eigen::VectorXd> sense(
+    const SensorModel& model, const Scan& scan) {
+  SensedPoints sensed;
+  Sense{model}(scan, sensed);
+  Eigen::VectorXi zones(sensed.count);
+  Points points_S(sensed.count, 3);
+  Eigen::VectorXd ranges(sensed.count), sigmas(sensed.count);
+  for (int i = 0; i < sensed.count; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    zones[i] = sensed.zone[at];
+    points_S.row(i) = sensed.point_S[at].transpose();
+    ranges[i] = sensed.range[at];
+    sigmas[i] = sensed.sigma[at];
+  }
+  return {zones, points_S, ranges, sigmas};
+}
+
 Skin joined(const Skin& a, const Skin& b) {
   if (!(a.model == b.model))
     throw ConfigError(
@@ -194,6 +212,10 @@ void bind_skin(nb::module_& m) {
   m.def("zone_directions", &zone_directions, "model"_a,
         "(64, 3) point of each zone at range 1 m, in the sensor's frame: [WA] eq. (1). Zone = 8 "
         "row + column.");
+  m.def("sense", &sense, "model"_a, "scan"_a,
+        "The sense stage alone, of the zones with a target inside the workspace: zones (n,), points "
+        "(n, 3) in the sensor's frame, ranges (n,) along the rays and their standard deviations "
+        "(n,) [m].");
   nb::class_<Mount>(m, "Mount", "Where one sensor sits: its frame in the link's, z looking out.")
       .def(
           "__init__",

@@ -80,12 +80,10 @@ inline Eigen::Map<const Points> points_view(const ArrayView& view, const char* n
 }
 
 inline void require_finite(const Eigen::Ref<const Points>& points, const char* name) {
-  // Farther off, squares would leave single precision.
-  constexpr double farthest = 1e9;  // [m]
-  if (points.allFinite() && (points.size() == 0 || points.cwiseAbs().maxCoeff() <= farthest))
+  if (points.allFinite() && (points.size() == 0 || points.cwiseAbs().maxCoeff() <= kFarthest))
     return;
   for (Eigen::Index i = 0; i < points.rows(); ++i) {
-    if (!points.row(i).allFinite() || points.row(i).cwiseAbs().maxCoeff() > farthest) {
+    if (!points.row(i).allFinite() || points.row(i).cwiseAbs().maxCoeff() > kFarthest) {
       throw GeometryError(
           std::string(name) + " row " + std::to_string(i) +
           " is not finite or farther than 1e9 m: every coordinate must be finite [m]");

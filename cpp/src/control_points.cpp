@@ -22,10 +22,7 @@ ControlPair control_of(const ClosestPair& pair, const Vector3& velocity_W) {
 }
 
 void note(Monitor& monitor, Reason reason, int link) {
-  Finding finding;
-  finding.reason = reason;
-  finding.link = link;
-  monitor.add(finding);
+  monitor.add({.reason = reason, .link = link});
 }
 
 }  // namespace

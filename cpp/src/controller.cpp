@@ -4,38 +4,20 @@
 #include <chrono>
 #include <cmath>
 
+#include "caution.hpp"
 #include "control_points.hpp"
+#include "internal_clock.hpp"
 #include "perception.hpp"
 #include "proxcgal/error.hpp"
 #include "stopwatch.hpp"
+#include "tick_history.hpp"
 
 namespace proxcgal {
 namespace {
 
-constexpr double kLongestStep = 0.5;  // [s] a longer one between two ticks is a clock that jumped
-constexpr double kExecuted = 0.5;     // share of the demanded rate that counts as executed
-constexpr double kEngaged = 0.5;      // activation from which avoidance must be executed
-constexpr double kRigid = 1e-6;       // how far a goal's rotation may be from orthonormal
-constexpr double kFarthest = 1e9;     // [m] squares stay far inside single precision
-constexpr double kBelieved = 0.1;     // [s] inside d_min: longer than one scan lasts
-constexpr double kTouching = 1e-9;    // [m] nearer than this no normal is left
-constexpr double kClockStep = 1e-3;   // [s] a stamp this far in the future is clock resolution
-constexpr double kInto = 0.02;        // [m/s] slower motion into the unseen holds nothing up
-
-/// Middle and corners of a sensor's field of view, in its frame.
-std::array<Vector3, 5> view_directions(const SensorModel& model) {
-  const double edge = std::tan(0.5 * model.field_of_view);
-  std::array<Vector3, 5> directions{Vector3(0, 0, 1), Vector3(edge, edge, 1),
-                                    Vector3(-edge, edge, 1), Vector3(edge, -edge, 1),
-                                    Vector3(-edge, -edge, 1)};
-  for (Vector3& direction : directions) direction.normalize();
-  return directions;
-}
-
-double distance_of(const std::optional<ClosestPair>& pair) {
-  if (!pair) return kInfinity;
-  return pair->distance;
-}
+constexpr double kExecuted = 0.5;  // share of the demanded rate that counts as executed
+constexpr double kEngaged = 0.5;   // activation from which avoidance must be executed
+constexpr double kRigid = 1e-6;    // how far a goal's rotation may be from orthonormal
 
 bool is_rigid(const Pose& T) {
   return T.matrix().allFinite() &&
@@ -52,22 +34,12 @@ struct Controller::Impl {
   Monitor monitor;
   detail::Perception perception;
   detail::ControlPoints control_points;
+  detail::Caution caution;
   Limits limits;
+  detail::InternalClock clock;
 
-  // The internal clock advances with the caller's, and goes on through its jumps.
-  bool started = false;
-  double caller_time = 0.0, clock = 0.0;
-
-  std::array<Vector3, 5> view_S;
-  std::optional<Avoidance> avoidance;   // the first of the stack
-  double stuck_since = -1.0;            // [s] internal, negative while avoidance is executed
-  double near_since = 0.0;              // [s] internal, since when a pair has been inside d_min
-  Vector3 outward_W = Vector3::Zero();  // last normal of a pair that was surely outside
-  std::array<TickRecord, kKeptTicks> kept;
-  std::size_t n_kept = 0;  // ever
-  bool frozen = false;     // STOP came: what led to it stays
-
-  bool by_sensors = false;  // this tick's cloud is the sensors', not known points
+  detail::TickHistory history;
+  double stuck_since = -1.0;  // [s] internal, negative while avoidance is executed
 
   JointVector qd_last;
   Posture posture;
@@ -81,62 +53,30 @@ struct Controller::Impl {
         skin(std::move(s)),
         config(std::move(c)),
         monitor(config.monitor),
-        perception(robot, skin, config.filter, config.method),
+        perception(robot, skin, config),
         control_points(*robot, skin, config),
+        caution(*robot, skin, config),
         limits{robot->q_min(), robot->q_max(), robot->qd_max(), robot->qdd_max()},
-        view_S(view_directions(skin.model)),
+        clock(config.period),
         posture(robot->make_posture()) {
     for (const TaskSpec& task : config.tasks) proxcgal::validate(task, *robot);
     if (!limits.qd_max.allFinite() || !limits.qdd_max.allFinite()) {
       throw ConfigError("robot '" + robot->spec().name +
                         "' has a joint without a speed or acceleration limit: give both");
     }
-    for (const TaskSpec& task : config.tasks) {
-      const auto* spec = std::get_if<Avoidance>(&task);
-      if (spec != nullptr && !avoidance) avoidance = *spec;
-    }
     qd_last = JointVector::Zero(robot->n_q());
     out.qd = qd_last;
     out.n_tasks = static_cast<int>(config.tasks.size());
-    perception.timings = config.timings;
   }
 
-  void note(Reason reason, int link = -1, int count = 1) {
-    Finding finding;
-    finding.reason = reason;
-    finding.link = link;
-    finding.count = count;
-    monitor.add(finding);
-  }
-
-  void advance(double time) {
-    const double step = time - caller_time;
-    if (!std::isfinite(time)) {
-      clock += started ? config.period : 0.0;
-      note(Reason::kTimeInvalid);
-      return;
-    }
-    if (!started) {
-      clock = 0.0;
-    } else if (step > 0.0 && step <= kLongestStep) {
-      clock += step;
-    } else {
-      clock += config.period;
-      note(Reason::kTimeInvalid);
-    }
-    started = true;
-    caller_time = time;
-  }
+  void note(Reason reason, int link = -1) { monitor.add({.reason = reason, .link = link}); }
 
   /// An age that is not a number, or below nothing, says that the stamp is of another clock.
   void judge_age(double age) {
-    const bool known = age >= -kClockStep;  // written so that what is not a number is unknown
+    const bool known = age >= -kClockResolution;  // so that what is not a number is unknown
     if (known && age <= config.monitor.joints_hold_after) return;
-    Finding stale;
-    stale.reason = known && age > config.monitor.joints_stop_after ? Reason::kJointStateLost
-                                                                   : Reason::kJointStateStale;
-    stale.age = age;
-    monitor.add(stale);
+    const bool lost = known && age > config.monitor.joints_stop_after;
+    monitor.add({.reason = lost ? Reason::kJointStateLost : Reason::kJointStateStale, .age = age});
   }
 
   /// Joint state and goal are usable; else the reason is noted.
@@ -157,126 +97,10 @@ struct Controller::Impl {
     } else if (spec.nearest > 1) {
       controls = control_points.links(*robot, posture, cloud_W, spec.nearest, velocity_W, monitor);
     } else if (out.pair) {
-      controls = control_points.one(control_of_pair(velocity_W));
+      controls = control_points.one(caution.control(out, velocity_W));
     }
     if (!controls.empty()) out.control = controls.front();
     build_avoidance(spec, *robot, posture, controls, task);
-  }
-
-  /// The pair as avoidance takes it: the trusted distance, and a normal that never turns over.
-  ControlPair control_of_pair(const Vector3& velocity_W) const {
-    ControlPair control;
-    control.link = out.pair->link;
-    control.control_W = out.pair->surface_W;
-    control.obstacle_W = out.pair->obstacle_W;
-    control.obstacle_velocity_W = velocity_W;
-    control.distance = out.trusted_distance;
-    control.fallback_normal_W = outward_W;
-    return control;
-  }
-
-  Vector3 middle_W(int link) const {
-    return posture.T_WL[static_cast<std::size_t>(link)] * robot->tree(link).bounds().center;
-  }
-
-  bool is_inside(const ClosestPair& pair) const {
-    const Pose& T_WL = posture.T_WL[static_cast<std::size_t>(pair.link)];
-    return robot->tree(pair.link).inside(T_WL.linear().transpose() *
-                                         (pair.obstacle_W - T_WL.translation()));
-  }
-
-  /// Is the pair's distance to be shortened, or turned over?
-  void trust(const PointsRef& cloud_W, bool sensed) {
-    const Vector3 apart =
-        out.pair ? Vector3(out.pair->surface_W - out.pair->obstacle_W) : Vector3(Vector3::Zero());
-    out.trusted_distance = distance_of(out.pair);
-    if (!sensed) {
-      if (!out.pair) return;
-      if (is_inside(*out.pair)) out.trusted_distance = -out.pair->distance;
-      // Where the point is on the surface, and no normal held before: out from the link's centre.
-      if (apart.norm() > kTouching) {
-        outward_W = apart.normalized() * (out.trusted_distance < 0.0 ? -1.0 : 1.0);
-      } else if (outward_W.isZero()) {
-        outward_W = (middle_W(out.pair->link) - out.pair->obstacle_W).normalized();
-      }
-      return;
-    }
-    for (int s = 0; s < perception.sensors(); ++s) {
-      const auto sensor = static_cast<std::size_t>(s);
-      const double late = perception.age(sensor, clock) - config.monitor.fresh_within;
-      const auto [begin, count] = perception.cloud_rows(sensor);
-      if (!(late > 0.0) || count == 0) continue;
-      const double shorter = config.monitor.approach_speed * late;
-      ClosestPair pair = control_points.nearest_of(
-          *robot, posture, cloud_W.middleRows(begin, count), out.trusted_distance + shorter);
-      if (!pair.found()) continue;
-      pair.point += static_cast<int>(begin);
-      out.pair = pair;
-      out.trusted_distance = std::max(pair.distance - shorter, 0.0);
-    }
-    if (!out.pair) return;
-    if (!perception.in_contact()) {
-      if (out.pair->distance > 0.0) {
-        outward_W = (out.pair->surface_W - out.pair->obstacle_W).normalized();
-      }
-      return;
-    }
-    note(Reason::kContact, out.pair->link);
-    // Taken for body, so as near as noise: whether the point measured is in or out of the surface,
-    // the normal that held before does.
-    if (apart.dot(outward_W) < 0.0) out.trusted_distance = -out.pair->distance;
-  }
-
-  /// Which zone must not lose its obstacle to the body filter. What was seen in one scan only may
-  /// be noise on the body itself.
-  void watch() {
-    const bool near = avoidance && out.pair && out.trusted_distance < avoidance->d_min;
-    if (!near) near_since = clock;
-    if (near && clock - near_since > kBelieved) {
-      perception.watch({out.pair_origin, out.pair->obstacle_W});
-    } else {
-      perception.watch({});
-    }
-  }
-
-  /// Into what is not seen nothing may move fast, and inside d_min nothing may come nearer: the
-  /// second has the last word, because that obstacle is known to be there.
-  void restrain(const Admissible& box, const Vector3& velocity_W) {
-    for (int s = 0; by_sensors && s < perception.sensors(); ++s) {
-      const auto sensor = static_cast<std::size_t>(s);
-      const double blind = perception.blind_for(sensor, clock, config.monitor);
-      if (blind > config.monitor.degraded_after) slow_into_view(s, blind, box);
-    }
-    const bool whole_body = config.control_point == ControlPoint::kWholeBody;
-    if (whole_body && avoidance && out.pair && out.trusted_distance < avoidance->d_min) {
-      const ControlPair control = control_of_pair(velocity_W);
-      const JointVector row = opening_row(*robot, posture, control);
-      keep_rate(row, 0.0, box, out.qd);
-    }
-  }
-
-  void slow_into_view(int s, double blind, const Admissible& box) {
-    const auto sensor = static_cast<std::size_t>(s);
-    const int link = perception.link(sensor);
-    const Pose T_WS = posture.T_WL[static_cast<std::size_t>(link)] * perception.T_LS(sensor);
-    Jacobian6 J;
-    robot->jacobian(posture, link, T_WS.translation(), J);
-    const double from = config.monitor.degraded_after, to = config.monitor.hold_after;
-    const double share = to > from ? std::clamp((to - blind) / (to - from), 0.0, 1.0) : 0.0;
-    const double allowed = share * config.monitor.blind_speed;
-    double into = 0.0;
-    for (const Vector3& view : view_S) {
-      const JointVector row = -(J.topRows<3>().transpose() * (T_WS.linear() * view));
-      into = std::max(into, -row.dot(out.qd));
-      keep_rate(row, -allowed, box, out.qd);
-    }
-    if (blind > to && into > kInto) {
-      Finding finding;
-      finding.reason = Reason::kBlindMotion;
-      finding.sensor = s;
-      finding.age = blind;
-      monitor.add(finding);
-    }
   }
 
   void build_stack(const PointsRef& cloud_W, const Vector3& velocity_W, const Pose& goal) {
@@ -327,20 +151,23 @@ struct Controller::Impl {
           note(Reason::kNotExecuted, out.control.link);
           // Outside d_min the goal may well hold against it: there the arm may come to rest.
           // The baseline moves another point than the pair's, and is left as it is published.
-          const bool inside = config.control_point == ControlPoint::kWholeBody &&
-                              out.trusted_distance < avoidance->d_min;
-          if (!inside) {
-            stuck_since = -1.0;
-          } else if (stuck_since < 0.0) {
-            stuck_since = clock;
-          } else if (clock - stuck_since > config.monitor.stuck_after) {
-            note(Reason::kAvoidanceStuck, out.control.link);
-          }
+          const bool whole_body = config.control_point == ControlPoint::kWholeBody;
+          stuck(whole_body && caution.inside(out));
           return;
         }
       }
     }
-    stuck_since = -1.0;
+    stuck(false);
+  }
+
+  void stuck(bool now) {
+    if (!now) {
+      stuck_since = -1.0;
+    } else if (stuck_since < 0.0) {
+      stuck_since = clock.now();
+    } else if (clock.now() - stuck_since > config.monitor.stuck_after) {
+      note(Reason::kAvoidanceStuck, out.control.link);
+    }
   }
 
   /// What each task wanted, and what is missing of it in the command that is issued.
@@ -353,16 +180,18 @@ struct Controller::Impl {
   }
 
   /// From the joint state and a cloud to an admissible velocity.
-  /// @param sensed  the cloud is the sensors', row by row
+  /// @param sensed  the cloud is the sensors', row by row; else it is known
   void act(const JointVector& q, const PointsRef& cloud_W, bool sensed, const Vector3& velocity_W,
            const Pose& goal) {
     detail::Stopwatch watch(config.timings);
     robot->update(q, posture);
-    by_sensors = sensed;
-    const double d_min = avoidance ? avoidance->d_min : 0.0;
-    out.pair =
-        control_points.nearest(clock, *robot, posture, cloud_W, d_min, engaged_within(), monitor);
-    trust(cloud_W, sensed);
+    out.pair = control_points.nearest(clock.now(), *robot, posture, cloud_W, caution.d_min(),
+                                      engaged_within(), monitor);
+    if (sensed) {
+      caution.trust_sensed(clock.now(), posture, perception, control_points, out, monitor);
+    } else {
+      caution.trust_known(posture, out);
+    }
     build_stack(cloud_W, velocity_W, goal);
     out.timings.distance_us = watch.lap_us();
     const std::span<const Task> tasks(stack.data(), config.tasks.size());
@@ -372,7 +201,9 @@ struct Controller::Impl {
     const Admissible box = admissible(limits, q, qd_last, config.period, scale);
     command({solution.rho.data(), static_cast<std::size_t>(solution.levels) + 1}, tasks, qd_last,
             box, out.qd);
-    restrain(box, velocity_W);
+    // What is known to be there has the last word over what may be where nothing is seen.
+    if (sensed) caution.slow_into_unseen(clock.now(), posture, perception, box, out, monitor);
+    caution.keep_off(posture, box, velocity_W, out);
     out.timings.solve_us = watch.lap_us();
     judge();
     if ((q.array() < limits.q_min.array() || q.array() > limits.q_max.array()).any())
@@ -386,34 +217,17 @@ struct Controller::Impl {
       const JointVector& at = usable ? q : posture.q;  // the last posture that could be trusted
       const Admissible box = admissible(limits, at, qd_last, config.period, 1.0);
       decelerate(qd_last, box, out.qd);
-      if (usable) restrain(box, Vector3::Zero());
+      if (usable) caution.keep_off(posture, box, Vector3::Zero(), out);
     }
     qd_last = out.qd;
     if (usable) report();
-    remember(q);
-  }
-
-  void remember(const JointVector& q) {
-    if (frozen) return;
-    TickRecord& record = kept[n_kept++ % kKeptTicks];
-    record.time = caller_time;
-    record.mode = out.mode;
-    record.q = q.size() == robot->n_q() ? q : JointVector::Constant(robot->n_q(), kInfinity);
-    record.qd = out.qd;
-    record.distance = distance_of(out.pair);
-    record.link = out.pair ? out.pair->link : -1;
-    record.origin = out.pair_origin;
-    record.n_findings = static_cast<int>(monitor.findings().size());
-    const auto first =
-        monitor.findings().first(std::min(monitor.findings().size(), record.findings.size()));
-    std::copy(first.begin(), first.end(), record.findings.begin());
-    frozen = out.mode == Mode::kStop;
+    history.add(clock.caller(), q, robot->n_q(), out, monitor.findings());
   }
 
   void begin(double time, bool late) {
     monitor.begin();
     monitor.deadline(late);
-    advance(time);
+    if (!clock.advance(time)) note(Reason::kTimeInvalid);
     out.pair.reset();
     out.pair_origin = {};
     out.trusted_distance = kInfinity;
@@ -437,14 +251,14 @@ const TickOutput& Controller::tick(double time, const JointVector& q, std::span<
   me.begin(time, late);
   const bool usable = me.usable(time, q, q_stamp, goal);
   if (usable) {
-    me.perception.update(me.clock, me.clock - me.caller_time, q, scans, me.monitor);
+    me.perception.update(me.clock.now(), me.clock.delay(), q, scans, me.monitor);
     me.out.timings.sense_us = me.perception.sense_us;
     me.out.timings.filter_us = me.perception.filter_us;
-    me.perception.check_freshness(me.clock, me.config.monitor, me.monitor);
+    me.perception.freshness().check(me.clock.now(), me.monitor);
     me.act(q, me.perception.cloud_W(), true, Vector3::Zero(), goal);
     if (me.out.pair)
       me.out.pair_origin = me.perception.origins()[static_cast<std::size_t>(me.out.pair->point)];
-    me.watch();
+    me.caution.watch(me.clock.now(), me.out, me.perception);
   }
   me.conclude(q, usable);
   me.out.timings.total_us = watch.lap_us();
@@ -477,23 +291,17 @@ std::span<const PointOrigin> Controller::cloud_origins() const {
 Eigen::Map<const Points> Controller::raw_cloud_W() const { return impl_->perception.raw_cloud_W(); }
 std::vector<double> Controller::scan_ages(double time) const {
   std::vector<double> ages(impl_->skin.mounts.size());
-  const double now = impl_->clock + (time - impl_->caller_time);
-  for (std::size_t s = 0; s < ages.size(); ++s) ages[s] = impl_->perception.age(s, now);
+  const double now = time + impl_->clock.delay();
+  for (std::size_t s = 0; s < ages.size(); ++s) ages[s] = impl_->perception.freshness().age(s, now);
   return ages;
 }
 const Robot& Controller::robot() const { return *impl_->robot; }
 const Skin& Controller::skin() const { return impl_->skin; }
 const ControllerConfig& Controller::config() const { return impl_->config; }
-std::vector<TickRecord> Controller::last_ticks() const {
-  const std::size_t n = std::min<std::size_t>(impl_->n_kept, kKeptTicks);
-  std::vector<TickRecord> records;
-  for (std::size_t back = n; back > 0; --back)
-    records.push_back(impl_->kept[(impl_->n_kept - back) % kKeptTicks]);
-  return records;
-}
+std::vector<TickRecord> Controller::last_ticks() const { return impl_->history.records(); }
 bool Controller::reset() {
   const bool left = impl_->monitor.reset();
-  if (left) impl_->frozen = false;
+  if (left) impl_->history.go_on();
   return left;
 }
 

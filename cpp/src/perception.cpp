@@ -8,53 +8,20 @@
 namespace proxcgal::detail {
 namespace {
 
-constexpr double kStampSlack = 1e-3;  // [s] a stamp this far in the future is clock resolution
-constexpr double kOldestStamp = 0.5;  // [s] an older scan says nothing of now
 // [m] from scan to scan, at most: what is watched comes near, it does not jump. Farther off it is
 // another thing that came into the zone's view, the arm itself as a rule.
 constexpr double kNearEnough = 0.08;
-constexpr int kTelling = 4;  // zones with a target: noise makes two equal payloads unlikely
-
-/// Sensors of one array carry one name up to its last '/': rows of equal arrays are equal.
-std::string array_name(const Mount& mount) {
-  const auto end = mount.name.rfind('/');
-  return end == std::string::npos ? mount.name : mount.name.substr(0, end);
-}
-int array_of(const Skin& skin, const Mount& mount) {
-  std::vector<std::string> names;
-  for (const Mount& other : skin.mounts) {
-    if (std::find(names.begin(), names.end(), array_name(other)) == names.end())
-      names.push_back(array_name(other));
-  }
-  return static_cast<int>(std::find(names.begin(), names.end(), array_name(mount)) - names.begin());
-}
 
 }  // namespace
 
-void JointHistory::push(double time, const JointVector& q) {
-  time_[count_ % kKept] = time;
-  q_[count_ % kKept] = q;
-  ++count_;
-}
-
-JointVector JointHistory::at(double time) const {
-  const std::size_t kept = std::min(count_, kKept);
-  if (time >= t(0)) return q(0);
-  for (std::size_t back = 1; back < kept; ++back) {
-    if (time < t(back)) continue;
-    const double span = t(back - 1) - t(back);
-    const double part = span > 0.0 ? (time - t(back)) / span : 0.0;
-    return q(back) + part * (q(back - 1) - q(back));
-  }
-  return q(kept - 1);
-}
-
 Perception::Perception(std::shared_ptr<const Robot> robot, const Skin& skin,
-                       const FilterConfig& config, Method method)
-    : robot_(std::move(robot)),
+                       const ControllerConfig& config)
+    : timings(config.timings),
+      robot_(std::move(robot)),
       sense_(skin.model),
-      config_(config),
-      method_(method),
+      config_(config.filter),
+      method_(config.method),
+      freshness_(skin, config.monitor),
       posture_(robot_->make_posture()) {
   for (int link = 0; link < robot_->n_links(); ++link)
     mesh_error_ = std::max(mesh_error_, robot_->mesh_error(link));
@@ -63,8 +30,6 @@ Perception::Perception(std::shared_ptr<const Robot> robot, const Skin& skin,
     sensor.link = robot_->link_row(mount.link);
     sensor.T_LS = mount.T_LS;
     for (auto& ranges : sensor.past) ranges.fill(kInfinity);
-    sensor.array = array_of(skin, mount);
-    arrays_ = std::max(arrays_, sensor.array + 1);
     sensors_.push_back(sensor);
   }
   const auto room = sensors_.size() * kZones;
@@ -79,29 +44,6 @@ Perception::Perception(std::shared_ptr<const Robot> robot, const Skin& skin,
   origins_.resize(room);
 }
 
-bool Perception::accept(double time, double delay, const Scan& scan, Monitor& monitor) {
-  Finding refused;
-  refused.reason = Reason::kScanRefused;
-  refused.sensor = scan.sensor;
-  if (scan.sensor < 0 || scan.sensor >= sensors()) {
-    monitor.add(refused);
-    return false;
-  }
-  Sensor& sensor = sensors_[static_cast<std::size_t>(scan.sensor)];
-  // The counter may wrap: what matters is which way it moved.
-  const bool advanced =
-      !sensor.counted || static_cast<std::int32_t>(scan.counter - sensor.counter) > 0;
-  const double stamp = scan.stamp + delay;
-  refused.age = time - stamp;
-  if (!advanced || !(stamp <= time + kStampSlack) || !(refused.age <= kOldestStamp)) {
-    monitor.add(refused);
-    return false;
-  }
-  sensor.counted = true;
-  sensor.counter = scan.counter;
-  return true;
-}
-
 void Perception::update(double time, double delay, const JointVector& q,
                         std::span<const Scan> scans, Monitor& monitor) {
   history_.push(time, q);
@@ -112,7 +54,7 @@ void Perception::update(double time, double delay, const JointVector& q,
   staged_.count = 0;
   for (const Scan& scan : scans) {
     Stopwatch watch(timings);
-    if (!accept(time, delay, scan, monitor)) continue;
+    if (!freshness_.accept(time, delay, scan, monitor)) continue;
     // One filter call for all scans of one stamp; a sensor twice in a batch needs two.
     if (scan.stamp != placed || sensors_[static_cast<std::size_t>(scan.sensor)].staged) {
       sense_us += watch.lap_us();
@@ -135,21 +77,15 @@ void Perception::stage(double time, const Scan& scan, Monitor& monitor) {
   sense_(scan, sensed);
   Sensor& sensor = sensors_[static_cast<std::size_t>(scan.sensor)];
   if (sensed.invalid > 0) {
-    Finding finding;
-    finding.reason = Reason::kZoneInvalid;
-    finding.sensor = scan.sensor;
-    finding.zone = sensed.first_invalid_zone;
-    finding.count = sensed.invalid;
-    monitor.add(finding);
+    monitor.add({.reason = Reason::kZoneInvalid,
+                 .sensor = scan.sensor,
+                 .zone = sensed.first_invalid_zone,
+                 .count = sensed.invalid});
   }
-  const bool same = scan.ranges == sensor.ranges && scan.status == sensor.status;
-  sensor.repeats = same && sensed.count >= kTelling ? sensor.repeats + 1 : 0;
-  sensor.ranges = scan.ranges;
-  sensor.status = scan.status;
   // A scan without one usable zone tells nothing: the sensor's last cloud stays, and its age grows.
-  if (sensed.invalid == kZones) return;
-  sensor.seen = true;
-  sensor.received = time;
+  const bool usable = sensed.invalid < kZones;
+  freshness_.note(time, scan, sensed.count, usable);
+  if (!usable) return;
   const Eigen::Index before = staged_.count;
   const Pose T_WS = posture_.T_WL[static_cast<std::size_t>(sensor.link)] * sensor.T_LS;
   sensor.n_raw = sensor.n_kept = 0;
@@ -186,9 +122,7 @@ void Perception::filter(Monitor& monitor) {
       config_.surface_margin &&
       remove_near_surface(*robot_, posture_, points, tolerance, keep_mask, &steps_);
   if (config_.surface_margin && !complete) {
-    Finding finding;
-    finding.reason = Reason::kWorkBounded;
-    monitor.add(finding);
+    monitor.add({.reason = Reason::kWorkBounded});
   }
   // Algorithm 1 drops only points that lie within their tolerance of a surface: where the margin
   // has dropped all of those, it finds nothing more, and only the literal form is asked still.
@@ -257,8 +191,9 @@ bool Perception::confirmed(const Sensor& sensor, const std::array<double, kZones
 
 void Perception::gather() {
   n_cloud_ = 0;
-  for (int id = 0; id < sensors(); ++id) {
-    Sensor& sensor = sensors_[static_cast<std::size_t>(id)];
+  int id = -1;
+  for (Sensor& sensor : sensors_) {
+    ++id;
     sensor.cloud_begin = n_cloud_;
     for (int i = 0; i < sensor.n_kept; ++i) {
       origins_[static_cast<std::size_t>(n_cloud_)] = {id, sensor.zone[static_cast<std::size_t>(i)]};
@@ -276,58 +211,10 @@ Eigen::Map<const Points> Perception::raw_cloud_W() const {
   return {raw_.data(), n, 3};
 }
 
-double Perception::age(std::size_t sensor, double time) const {
-  return sensors_[sensor].seen ? time - sensors_[sensor].received : kInfinity;
-}
-
-double Perception::blind_for(std::size_t sensor, double time, const MonitorConfig& config) const {
-  const bool suspect =
-      config.suspect_repeats > 0 && sensors_[sensor].repeats >= config.suspect_repeats;
-  return suspect ? kInfinity : age(sensor, time);
-}
-
-void Perception::check_freshness(double time, const MonitorConfig& config, Monitor& monitor) const {
-  // A skin without sensors sees nothing: to the arm that is the same as silence.
-  double youngest = kInfinity;
-  for (std::size_t id = 0; id < sensors_.size(); ++id) {
-    const double old = age(id, time);
-    youngest = std::min(youngest, old);
-    const int repeats = sensors_[id].repeats;
-    if (config.suspect_repeats > 0 && repeats >= config.suspect_repeats) {
-      Finding finding;
-      finding.reason = Reason::kSensorSuspect;
-      finding.sensor = static_cast<int>(id);
-      finding.age = old;
-      finding.count = repeats;
-      monitor.add(finding);
-    }
-    if (!(old > config.degraded_after)) continue;
-    Finding finding;
-    finding.reason = Reason::kSensorSilent;
-    finding.sensor = static_cast<int>(id);
-    finding.age = old;
-    monitor.add(finding);
-  }
-  if (youngest > config.hold_after) {
-    Finding finding;
-    finding.reason = Reason::kAllSensorsSilent;
-    finding.age = youngest;
-    monitor.add(finding);
-    return;
-  }
-  for (int array = 0; array < arrays_; ++array) {
-    Finding finding;
-    finding.reason = Reason::kArraySilent;
-    finding.age = kInfinity;
-    finding.count = 0;
-    for (std::size_t id = 0; id < sensors_.size(); ++id) {
-      if (sensors_[id].array != array) continue;
-      if (finding.count++ == 0) finding.sensor = static_cast<int>(id);
-      finding.age = std::min(finding.age, age(id, time));
-    }
-    // A single sensor is no array: its silence slows by direction.
-    if (finding.count > 1 && finding.age > config.hold_after) monitor.add(finding);
-  }
+void Perception::watch(const Watched& watched) {
+  const PointOrigin &now = watched.origin, &before = watched_.origin;
+  if (now.sensor != before.sensor || now.zone != before.zone) in_contact_ = false;
+  watched_ = watched;
 }
 
 }  // namespace proxcgal::detail

@@ -3,39 +3,22 @@
 #include <memory>
 #include <vector>
 
+#include "freshness.hpp"
+#include "joint_history.hpp"
 #include "proxcgal/controller.hpp"
 
 namespace proxcgal::detail {
-
-/// Where the joints were in the last moments: a scan is placed where the arm was at its stamp.
-class JointHistory {
- public:
-  void push(double time, const JointVector& q);
-  /// Linear between neighbours, the end value outside of what is kept.
-  JointVector at(double time) const;
-
- private:
-  // Half a second at 1 kHz and more: scans older than that are refused.
-  static constexpr std::size_t kKept = 1024;
-  std::array<double, kKept> time_{};
-  std::array<JointVector, kKept> q_;
-  std::size_t count_ = 0;  // ever pushed
-  const JointVector& q(std::size_t back) const { return q_[(count_ - 1 - back) % kKept]; }
-  double t(std::size_t back) const { return time_[(count_ - 1 - back) % kKept]; }
-};
 
 /// From scans to the cloud that the arm avoids: sense -> filter, each sensor's last scan kept in
 /// world until its next one.
 class Perception {
  public:
-  Perception(std::shared_ptr<const Robot> robot, const Skin& skin, const FilterConfig& config,
-             Method method);
+  Perception(std::shared_ptr<const Robot> robot, const Skin& skin, const ControllerConfig& config);
 
   /// @param time   internal clock [s]
   /// @param delay  internal time minus the caller's: stamps are brought to the internal clock
   void update(double time, double delay, const JointVector& q, std::span<const Scan> scans,
               Monitor& monitor);
-  void check_freshness(double time, const MonitorConfig& config, Monitor& monitor) const;
 
   Eigen::Map<const Points> cloud_W() const { return {cloud_.data(), n_cloud_, 3}; }
   std::span<const PointOrigin> origins() const {
@@ -43,9 +26,7 @@ class Perception {
   }
   /// Gathered when asked for: no tick needs it.
   Eigen::Map<const Points> raw_cloud_W() const;
-  double age(std::size_t sensor, double time) const;  ///< [s] since receipt
-  /// [s] since the sensor last told anything that can be believed.
-  double blind_for(std::size_t sensor, double time, const MonitorConfig& config) const;
+  const Freshness& freshness() const { return freshness_; }
   const Pose& T_LS(std::size_t sensor) const { return sensors_[sensor].T_LS; }
   int link(std::size_t sensor) const { return sensors_[sensor].link; }
   /// Rows of the cloud that came from one sensor: first, count.
@@ -59,10 +40,9 @@ class Perception {
     PointOrigin origin;
     Vector3 obstacle_W = Vector3::Zero();
   };
-  void watch(const Watched& watched) { watched_ = watched; }
+  void watch(const Watched& watched);
   /// Is the watched pair in the cloud only because it was watched?
   bool in_contact() const { return in_contact_; }
-  int sensors() const { return static_cast<int>(sensors_.size()); }
   double sense_us = 0, filter_us = 0;  ///< of the last update, where timings are on
   bool timings = false;
 
@@ -70,16 +50,8 @@ class Perception {
   struct Sensor {
     int link = 0;
     Pose T_LS = Pose::Identity();
-    bool counted = false;  // a scan came, usable or not
-    bool seen = false;     // one with a usable zone came
-    bool staged = false;   // one waits for the filter
-    std::uint32_t counter = 0;
-    int array = -1;                       // sensors of one array share it
-    int repeats = 0;                      // equal payloads in a row
-    std::array<double, kZones> ranges{};  // of the last scan
-    std::array<std::uint8_t, kZones> status{};
+    bool staged = false;           // a scan waits for the filter
     Eigen::Index cloud_begin = 0;  // its rows of the cloud
-    double received = 0.0;
     int n_raw = 0, n_kept = 0;
     std::array<Vector3, kZones> raw_W, kept_W;
     std::array<std::uint8_t, kZones> zone;
@@ -88,7 +60,6 @@ class Perception {
     std::array<std::array<double, kZones>, 3> past;
   };
 
-  bool accept(double time, double delay, const Scan& scan, Monitor& monitor);
   void stage(double time, const Scan& scan, Monitor& monitor);
   void filter(Monitor& monitor);
   void keep(Sensor& sensor, int begin, int end);
@@ -102,7 +73,7 @@ class Perception {
   Method method_;
   double mesh_error_ = 0.0;  // of the worst link: added to every tolerance
   std::vector<Sensor> sensors_;
-  int arrays_ = 0;
+  Freshness freshness_;
   Watched watched_;
   bool in_contact_ = false;
   JointHistory history_;

@@ -331,15 +331,20 @@ TEST(Controller, AnObstacleThatTouchesIsNotTakenForBody) {
     EXPECT_LT(out.trusted_distance, 0.05);
   }
   EXPECT_GT(kept, 10);
-  // Seen far off again, it is an obstacle like any other.
+  // Gone, it is no contact any more; nor is what another zone then sees.
   Scan scan;
-  scan.counter = 60;
-  scan.stamp = 4.2;
   scan.status.fill(255);
-  scan.ranges[27] = 0.1;
-  scan.status[27] = 5;
-  controller.tick(4.2, q, std::span(&scan, 1), goal);
-  EXPECT_FALSE(found(controller, Reason::kContact));
+  for (int i = 60; i < 63; ++i) {
+    scan.counter = static_cast<std::uint32_t>(i);
+    scan.stamp = 0.07 * i;
+    if (i > 60) {
+      scan.ranges[28] = 0.1;
+      scan.status[28] = 5;
+    }
+    const TickOutput& out = controller.tick(scan.stamp, q, std::span(&scan, 1), goal);
+    EXPECT_EQ(out.pair.has_value(), i > 60);
+    EXPECT_FALSE(found(controller, Reason::kContact)) << i;
+  }
 }
 
 /// The signed distance from a point to a link: negative inside.

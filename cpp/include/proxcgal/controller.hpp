@@ -74,7 +74,8 @@ struct TickOutput {
   /// Nearest of the links that joints can move away. In whole-body mode it drives the arm; its
   /// point is a row of `cloud_W` (`tick`) or of the points given (`tick_known`).
   std::optional<ClosestPair> pair;
-  PointOrigin pair_origin;  ///< sensor and zone that saw it, where one did
+  double pair_distance() const;  ///< [m] of the pair, infinity for none
+  PointOrigin pair_origin;       ///< sensor and zone that saw it, where one did
   /// [m] what of the pair's distance is still to be trusted: less the way that something may have
   /// come since the scan was fresh, negative where the obstacle is inside the surface.
   double trusted_distance = kInfinity;
@@ -84,6 +85,11 @@ struct TickOutput {
   std::array<TaskReport, kMaxLevels> tasks;
   Timings timings;
 };
+
+inline double TickOutput::pair_distance() const {
+  if (!pair) return kInfinity;
+  return pair->distance;
+}
 
 /// What is kept of one tick, for whoever asks why the arm stopped.
 struct TickRecord {

@@ -18,6 +18,8 @@ inline constexpr int kMaxLevels = 16;
 inline constexpr int kZones = 64;  ///< 8 x 8, row by row
 
 inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
+/// [m] from the origin, at most: squares stay far inside single precision.
+inline constexpr double kFarthest = 1e9;
 
 using Points = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;           ///< (n, 3) [m]
 using Triangles = Eigen::Matrix<std::int32_t, Eigen::Dynamic, 3, Eigen::RowMajor>;  ///< (f, 3)

@@ -3,6 +3,7 @@
 #include <numeric>
 
 #include "bvh.hpp"
+#include "kernels.hpp"
 
 namespace proxcgal::detail {
 namespace {
@@ -224,6 +225,7 @@ struct Bvh::Builder {
 };
 
 Bvh::Bvh(const Points& vertices, const Triangles& triangles) {
+  kernels();  // what is wrong with their choice is told now, not in a tick
   scale_ = vertices.cwiseAbs().maxCoeff();
   blocks_.reserve(static_cast<std::size_t>(triangles.rows()) / 2);
   Builder builder(vertices, triangles, *this);

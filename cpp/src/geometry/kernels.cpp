@@ -1,16 +1,20 @@
 #include "kernels.hpp"
 
 #include <cstdlib>
-#include <cstring>
+#include <string>
+
+#include "proxcgal/error.hpp"
 
 namespace proxcgal::detail {
 namespace {
 
 const Kernels& choose() {
+  const char* set = std::getenv("PROXCGAL_KERNELS");
+  const std::string wanted = set != nullptr ? set : "";
+  if (!wanted.empty() && wanted != "portable")
+    throw ConfigError("PROXCGAL_KERNELS is '" + wanted + "', must be 'portable' or not set");
 #ifdef PROXCGAL_HAS_AVX2
-  const char* forced = std::getenv("PROXCGAL_KERNELS");
-  const bool portable = forced != nullptr && std::strcmp(forced, "portable") == 0;
-  if (!portable && __builtin_cpu_supports("avx2") != 0) return kAvx2Kernels;
+  if (wanted.empty() && __builtin_cpu_supports("avx2") != 0) return kAvx2Kernels;
 #endif
   return kPortableKernels;
 }

@@ -50,7 +50,8 @@ struct Kernels {
 };
 
 /// The best that this processor runs; PROXCGAL_KERNELS=portable in the environment forces the
-/// portable ones. Chosen once, at the first call.
+/// portable ones. Chosen once, at the first call, which is the building of a tree.
+/// @throws ConfigError  another name in the environment
 const Kernels& kernels();
 
 extern const Kernels kPortableKernels;

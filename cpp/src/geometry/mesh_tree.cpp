@@ -22,8 +22,7 @@ using Primitive = CGAL::AABB_triangle_primitive<Kernel, std::vector<Triangle3>::
 using CgalTree = CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>>;
 
 constexpr int kMostCrossings = 64;
-constexpr double kApart = 1e-7;    // [m]
-constexpr double kFarthest = 1e9;  // [m] squares stay far inside single precision
+constexpr double kApart = 1e-7;  // [m]
 constexpr std::int64_t kAnySteps = std::numeric_limits<std::int64_t>::max();
 
 Kernel::Point_3 to_cgal(const Vector3& p) { return {p.x(), p.y(), p.z()}; }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "frames.hpp"
 #include "geometry/point_chunk.hpp"
 
 namespace proxcgal {
@@ -130,7 +131,7 @@ class Search {
   LinkBox box_of(int link) const { return {robot_.tree(link).bounds(), T_WL(link)}; }
   const Pose& T_WL(int link) const { return posture_.T_WL[static_cast<std::size_t>(link)]; }
   Vector3 to_link(const Vector3& point_W, int link) const {
-    return T_WL(link).linear().transpose() * (point_W - T_WL(link).translation());
+    return detail::into(T_WL(link), point_W);
   }
 
   void visit(Eigen::Index point, int link) { visit(point, link, squared_); }

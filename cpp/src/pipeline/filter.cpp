@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "frames.hpp"
 #include "geometry/point_chunk.hpp"
 
 namespace proxcgal {
@@ -74,7 +75,7 @@ void remove_body_fast(const Robot& robot, const Posture& posture, const PointsRe
     const double length = ray_W.norm();
     if (!(length > min_hit)) return false;
     const Vector3 direction_L = T_WL.linear().transpose() * (ray_W / length);
-    const Vector3 origin_L = T_WL.linear().transpose() * (origin_W - T_WL.translation());
+    const Vector3 origin_L = detail::into(T_WL, origin_W);
     const double near = std::max(min_hit, length - tolerance[row]), far = length + tolerance[row];
     if (!tree.any_hit(origin_L, direction_L, near, far)) return false;
     const double before = std::nextafter(near, 0.0);
@@ -100,8 +101,7 @@ bool remove_near_surface(const Robot& robot, const Posture& posture, const Point
   const auto touches = [&](std::size_t row, const MeshTree& tree, const Pose& T_WL) {
     if (left < 0) return false;
     const Vector3 point_W = points_W.row(static_cast<Eigen::Index>(row)).transpose();
-    const Vector3 point_L = T_WL.linear().transpose() * (point_W - T_WL.translation());
-    return tree.within(point_L, tolerance[row], &left);
+    return tree.within(detail::into(T_WL, point_W), tolerance[row], &left);
   };
   drop_near(robot, posture, points_W, tolerance, keep, touches);
   return left >= 0;

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxcgal import _core
-from proxcgal.sim.ranges import NO_TARGET, ZONES
+from proxcgal.sim.ranges import ZONES
 from proxcgal.sim.scenario import Scenario
 from proxcgal.sim.setup import Setup
 from proxcgal.sim.source import SimulatedSource
@@ -79,23 +79,19 @@ def take_snapshot(scenario: Scenario, scans: int = 1) -> Snapshot:
 def _placed(setup: Setup, given: TickInput, kept: NDArray[np.bool_]) -> Snapshot:
     """One scan of every sensor: what the core's sense stage makes of it, emitters beside."""
     settings, model = setup.scenario.controller.filter, setup.skin.model
-    per_range_S = np.asarray(_core.zone_directions(model))
-    slant = np.linalg.norm(per_range_S, axis=1)
     poses_W = np.asarray(setup.robot.link_poses(given.q))
     links = setup.robot.link_names
     origins, points, tolerances, environment = [], [], [], []
     for scan in given.scans:
         mount = setup.skin.mounts[scan.sensor]
         T_WS = poses_W[links.index(mount.link)] @ np.asarray(mount.T_LS)
-        range_z = np.asarray(scan.ranges)
-        points_W = (range_z[:, None] * per_range_S) @ T_WS[:3, :3].T + T_WS[:3, 3]
-        seen = np.asarray(scan.status) != NO_TARGET
-        seen &= (slant * range_z <= model.workspace) & (points_W[:, 2] >= settings.z_min)
-        sigma = slant * np.array([model.sigma(z) for z in range_z.tolist()])
-        points.append(points_W[seen])
+        zones, points_S, _, sigma = (np.asarray(part) for part in _core.sense(model, scan))
+        points_W = points_S @ T_WS[:3, :3].T + T_WS[:3, 3]
+        above = points_W[:, 2] >= settings.z_min
+        points.append(points_W[above])
         origins.append(np.tile(T_WS[:3, 3], (len(points[-1]), 1)))
-        tolerances.append(np.maximum(settings.tolerance, settings.sigmas * sigma[seen]))
-        environment.append(kept[scan.sensor, seen])
+        tolerances.append(np.maximum(settings.tolerance, settings.sigmas * sigma[above]))
+        environment.append(kept[scan.sensor, zones[above]])
     return Snapshot(
         setup=setup, scans=given.scans, origins_W=np.concatenate(origins),
         points_W=np.concatenate(points), tolerance=np.concatenate(tolerances),

@@ -24,6 +24,7 @@ struct MonitorConfig {
 };
 
 inline constexpr int kMaxFindings = 64;
+inline constexpr double kClockResolution = 1e-3;  ///< [s] a stamp may be that far in the future
 
 /// The mode a finding calls for. One table for all.
 Mode mode_of(Reason reason);
