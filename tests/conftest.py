@@ -1,8 +1,15 @@
 """What every test may use: markers and the options behind them."""
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
+
+from proxcgal.apps import cli
+from proxcgal.study import static
+from proxcgal.study.campaign import Campaign
+from proxcgal.study.kind import Wishes
 
 SHARED_ROBOTS = Path(__file__).parents[2] / "shared" / "robots"
 
@@ -39,6 +46,48 @@ def pytest_terminal_summary(
 def shared_robots() -> Path:
     """The folder of robot descriptions that play a user's own; only for tests marked `shared`."""
     return SHARED_ROBOTS
+
+
+class Answer(NamedTuple):
+    """What a command gave."""
+
+    code: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def call(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Callable[..., Answer]:
+    """Runs a command in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: str | Path) -> Answer:
+        code = cli.main([str(argument) for argument in arguments])
+        return Answer(code, *capsys.readouterr())
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def planned() -> Campaign:
+    """A small campaign: two draws of 0.2 s round one scene, three controllers each."""
+    return static.plan(
+        Wishes(runs=2, seed=0, scenarios=("front_plane",), overrides=("duration=0.2",))
+    )
+
+
+@pytest.fixture(scope="session")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of that campaign after it ran in one process, uninterrupted."""
+    folder = tmp_path_factory.mktemp("campaign") / "whole"
+    arguments = [
+        "campaign", "static", "--scenario", "front_plane", "--runs", "2", "--set", "duration=0.2",
+        "--workers", "1", "--keep", "worst:1", "--quiet", "--out", str(folder),
+    ]  # fmt: skip
+    assert cli.main(arguments) == 0
+    return folder
 
 
 @pytest.fixture(scope="session")

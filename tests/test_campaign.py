@@ -4,41 +4,29 @@ import contextlib
 import json
 import os
 import random
-import shlex
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
-from typing import NamedTuple
+from types import ModuleType
+from typing import Any
 
-import numpy as np
-import polars as pl
 import pytest
-from scipy import stats
 
 import proxcgal as px
-from proxcgal.apps import cli
-from proxcgal.apps.kept import keep_worst
-from proxcgal.sim.recording import read_recording
-from proxcgal.sim.replay import first_difference
 from proxcgal.sim.scenario import load_scenario
-from proxcgal.sim.truth import Truth
 from proxcgal.study import static
-from proxcgal.study.bootstrap import median_interval
 from proxcgal.study.campaign import Campaign, Trial, run_campaign, unfinished
-from proxcgal.study.draws import crosses, draw_scene, reachable
-from proxcgal.study.kind import Wishes
 from proxcgal.study.pool import Pool
 from proxcgal.study.store import Outcome, Store
 from proxcgal.study.trials import robot_of
 
 SMALL = ("--scenario", "front_plane", "--runs", "2", "--set", "duration=0.2")
 ONE = (*SMALL[:3], "1", *SMALL[4:], "--workers", "1", "--quiet")
-WISHES = Wishes(runs=2, seed=0, scenarios=("front_plane",), overrides=("duration=0.2",))
 PROGRAM = [sys.executable, "-c", "import sys; from proxcgal.apps.cli import main; sys.exit(main())"]
 
 PERFORM = """
@@ -80,41 +68,13 @@ def fails(trial, report):
 """
 
 
-class Answer(NamedTuple):
-    code: int
-    out: str
-    err: str
-
-
-Call = Callable[..., Answer]
+Call = Callable[..., Any]
 
 
 @pytest.fixture
-def call(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Call:
-    """Runs `proxcgal campaign static` in an empty folder."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: str | Path) -> Answer:
-        code = cli.main(["campaign", "static", *map(str, arguments)])
-        return Answer(code, *capsys.readouterr())
-
-    return run
-
-
-@pytest.fixture(scope="session")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A small campaign that ran in one process, uninterrupted."""
-    folder = tmp_path_factory.mktemp("campaign") / "whole"
-    arguments = ["campaign", "static", *SMALL, "--workers", "1", "--keep", "worst:1", "--quiet"]
-    assert cli.main([*arguments, "--out", str(folder)]) == 0
-    return folder
-
-
-@pytest.fixture(scope="session")
-def planned() -> Campaign:
-    return static.plan(WISHES)
+def call(call: Call) -> Call:
+    """`proxcgal campaign static` in an empty folder."""
+    return partial(call, "campaign", "static")
 
 
 @pytest.fixture
@@ -345,113 +305,6 @@ def test_a_cluster_without_workers_is_told_as_such(
     assert not (tmp_path / "out").exists()
 
 
-# --- What is written
-
-
-def test_the_table_has_a_row_a_trial(whole: Path) -> None:
-    table = pl.read_parquet(whole / "trials.parquet")
-    assert table.shape[0] == 6
-    assert table["key"].n_unique() == 6
-    assert table["controller"].to_list() == ["wb", "sm", "wb_known"] * 2
-    for row in table.iter_rows(named=True):
-        scenario = load_scenario("front_plane", shlex.split(row["command"])[8:])
-        assert scenario.obstacles[0].position[0] == row["panel_x_m"]
-        assert scenario.q0[5] == row["q0_5"]
-
-
-def test_the_command_beside_a_recording_repeats_it(
-    whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    entry = json.loads(summary(whole))["worst"][0]
-    table = pl.read_parquet(whole / "trials.parquet").filter(pl.col("name") == entry["name"])
-    words = shlex.split(entry["command"])
-    assert words[0] == "proxcgal"
-    assert cli.main([*words[1:], "--no-picture", "--quiet", "--out", "again"]) == 0
-    again = json.loads(Path("again/summary.json").read_text())["controllers"]["wb"]
-    for key, value in again.items():
-        assert value == table[key][0]
-
-
-def test_a_kept_recording_holds_the_ticks_with_scans_and_cannot_be_computed_again(
-    whole: Path,
-) -> None:
-    entry = json.loads(summary(whole))["worst"][0]
-    recording = read_recording(whole / entry["recording"])
-    assert recording.damage is None
-    assert recording.settings.ticks == "scans"
-    assert [tick.given.time for tick in recording.ticks] == pytest.approx([0.0, 0.07, 0.14])
-    assert all(len(tick.given.scans) == 30 for tick in recording.ticks)
-    with pytest.raises(px.ConfigError, match="every tick only"):
-        first_difference(recording)
-
-
-def test_a_recording_that_is_there_is_not_made_again_and_every_tick_kept_where_asked_for(
-    call: Call,
-) -> None:
-    arguments = (*ONE, "--keep", "worst:1", "--out", "here")
-    assert call(*arguments).code == 0
-    file = next(Path("here/recordings").iterdir())
-    before = file.stat()
-    assert call(*arguments).code == 0
-    assert (file.stat().st_ino, file.stat().st_mtime_ns) == (before.st_ino, before.st_mtime_ns)
-    assert call(*arguments, "--every-tick").code == 0
-    recording = read_recording(file)
-    assert len(recording.ticks) == 20
-    assert first_difference(recording) is None
-
-
-@pytest.mark.parametrize("raises", [True, False])
-def test_a_recording_that_fails_is_told_and_costs_no_result(
-    call: Call, monkeypatch: pytest.MonkeyPatch, raises: bool
-) -> None:
-    def simulate(*_: object, recording: Path, **__: object) -> object:
-        recording.parent.mkdir(parents=True)
-        recording.touch()
-        if raises:
-            raise px.SimulationError("disk full")
-        return SimpleNamespace(recording_failure="disk full")
-
-    monkeypatch.setattr("proxcgal.study.trials.simulate", simulate)
-    answer = call(*ONE, "--keep", "worst:1", "--out", "here")
-    assert answer.code == 1
-    assert answer.err == "proxcgal: front_plane-0-wb: not recorded: disk full\n"
-    assert list(Path("here/recordings").iterdir()) == []
-    told = json.loads(summary(Path("here")))["worst"]
-    assert [(entry["name"], entry["error"]) for entry in told] == [
-        ("front_plane-0-wb", "disk full")
-    ]
-    assert pl.read_parquet("here/trials.parquet").shape[0] == 3
-    assert "not recorded: disk full" in Path("here/report.html").read_text()
-
-
-def test_recordings_of_other_trials_go_half_ones_too(tmp_path: Path) -> None:
-    (tmp_path / "recordings").mkdir()
-    for name in ("a.mcap", ".a.mcap"):
-        (tmp_path / "recordings" / name).touch()
-    with Pool(1) as pool:
-        assert keep_worst([], tmp_path, "scans", pool, quiet=True) == []
-    assert list((tmp_path / "recordings").iterdir()) == []
-
-
-def test_more_runs_go_on_where_fewer_ended(call: Call, whole: Path) -> None:
-    assert call(*ONE, "--keep", "none", "--out", "here").code == 0
-    before = trial_files(Path("here"))
-    assert len(before) == 3
-    more = (*SMALL, "--workers", "1", "--keep", "worst:1", "--quiet", "--out", "here")
-    assert call(*more).code == 0
-    after = trial_files(Path("here"))
-    assert {name: after[name] for name in before} == before
-    assert summary(Path("here")) == summary(whole)
-
-
-def test_a_report_is_made_again_from_the_folder(whole: Path) -> None:
-    before = (whole / "report.html").read_bytes()
-    assert cli.main(["report", str(whole)]) == 0
-    assert (whole / "report.html").read_bytes() == before
-    assert before.count(b"<img ") == 1
-
-
 def test_a_half_written_trial_is_none(planned: Campaign, tmp_path: Path) -> None:
     key = planned.trials[0].key
     with Store(tmp_path, {}) as store:
@@ -460,6 +313,22 @@ def test_a_half_written_trial_is_none(planned: Campaign, tmp_path: Path) -> None
         file = tmp_path / "trials" / f"{key}.json"
         file.write_bytes(file.read_bytes()[:-9])
         assert store.outcomes([key]) == {}
+
+
+def test_a_key_belongs_to_what_a_trial_is_and_not_to_where_it_stands(planned: Campaign) -> None:
+    trial = planned.trials[0]
+    assert replace(trial, tags={"draw": 9}, source="elsewhere").key == trial.key
+    other = [
+        replace(trial, seed=1), replace(trial, controller="sm"), planned.trials[3],
+        replace(trial, scenario=load_scenario("front_plane")),
+    ]  # fmt: skip
+    assert len({trial.key, *(each.key for each in other)}) == 5
+
+
+def test_names_of_trials_lead_nowhere(planned: Campaign) -> None:
+    trial: Trial = replace(planned.trials[0], tags={"scene": "../../etc/x", "draw": 0})
+    assert "/" not in trial.name
+    assert not trial.name.startswith(".")
 
 
 # --- Bad input
@@ -559,79 +428,3 @@ def test_two_processes_do_not_work_in_one_folder(call: Call, whole: Path) -> Non
         answer = call(*SMALL, "--quiet", "--out", whole)
     assert answer.code == 2
     assert "another process is at work on this campaign" in answer.err
-
-
-# --- Draws and intervals
-
-
-def test_draws_meet_what_is_promised_of_them() -> None:
-    base = load_scenario("front_plane")
-    robot = px.load_robot("ur10e")
-    redrawn = 0
-    for number in range(12):
-        draw = draw_scene(base, robot, 7, number)
-        redrawn += draw.redrawn.total()
-        scenario, panel = draw.scenario, draw.scenario.obstacles[0]
-        distance, _, own = Truth(robot, scenario.obstacles)(np.array(scenario.q0))
-        assert distance >= 0.3
-        assert own >= 0.03
-        np.testing.assert_array_less(
-            np.abs(np.subtract(panel.position, base.obstacles[0].position)), 0.1001
-        )
-        assert np.abs(panel.rpy).max() < 0.2601
-        assert np.abs(np.subtract(scenario.q0, base.q0)).max() < 0.2001
-        again = draw_scene(base, robot, 7, number)
-        assert again.overrides == draw.overrides
-    assert redrawn > 0
-
-
-def test_a_goal_is_within_reach_where_a_posture_reaches_it() -> None:
-    robot = px.load_robot("ur10e")
-    q0 = np.array(load_scenario("front_plane").q0)
-    generator = np.random.default_rng(5)
-    for _ in range(5):
-        assert reachable(robot, q0, robot.tool_pose(q0 + generator.uniform(-0.6, 0.6, 6)))
-    far = np.array(robot.tool_pose(q0))
-    far[:3, 3] = (1.5, 0.0, 0.6)
-    assert not reachable(robot, q0, far)
-
-
-def test_a_line_crosses_a_plate_or_passes_it() -> None:
-    T_WO = np.eye(4)
-    T_WO[:3, 3] = (1.0, 0.0, 0.0)
-    size = (0.02, 1.0, 1.0)
-    crossing = np.array([0.0, 0.0, 0.0]), np.array([2.0, 0.8, 0.0])
-    passing = np.array([0.0, 0.0, 0.0]), np.array([2.0, 1.2, 0.0])
-    before = np.array([0.0, 0.0, 0.0]), np.array([0.9, 0.0, 0.0])
-    assert crosses(size, T_WO, *crossing)
-    assert not crosses(size, T_WO, *passing)
-    assert not crosses(size, T_WO, *before)
-
-
-def test_the_medians_interval_is_that_of_scipy() -> None:
-    values = np.random.default_rng(4).normal(100.0, 30.0, 80).tolist()
-    interval = median_interval(values)
-    assert interval is not None
-    assert interval.median == np.median(values)
-    oracle = stats.bootstrap(
-        (values,), np.median, method="percentile", n_resamples=10_000, rng=1
-    ).confidence_interval
-    assert interval.low == pytest.approx(oracle.low, abs=2.0)
-    assert interval.high == pytest.approx(oracle.high, abs=2.0)
-    assert median_interval([]) is None
-
-
-def test_a_key_belongs_to_what_a_trial_is_and_not_to_where_it_stands(planned: Campaign) -> None:
-    trial = planned.trials[0]
-    assert replace(trial, tags={"draw": 9}, source="elsewhere").key == trial.key
-    other = [
-        replace(trial, seed=1), replace(trial, controller="sm"), planned.trials[3],
-        replace(trial, scenario=load_scenario("front_plane")),
-    ]  # fmt: skip
-    assert len({trial.key, *(each.key for each in other)}) == 5
-
-
-def test_names_of_trials_lead_nowhere(planned: Campaign) -> None:
-    trial: Trial = replace(planned.trials[0], tags={"scene": "../../etc/x", "draw": 0})
-    assert "/" not in trial.name
-    assert not trial.name.startswith(".")

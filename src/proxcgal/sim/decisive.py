@@ -16,15 +16,13 @@ from numpy.typing import NDArray
 from proxcgal import _core
 from proxcgal.sim import boxes
 from proxcgal.sim.surfaces import Surfaces, inverse, moved
+from proxcgal.sim.truth import AHEAD_M
 
 if TYPE_CHECKING:
     from proxcgal.models.robots import Robot
     from proxcgal.sim.scenario_keys import Obstacle
 
 Array = NDArray[np.float64]
-
-#: Looked for beyond the least distance, so that a far pair is not asked at every tick [m].
-_AHEAD = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +113,7 @@ class _Pairs:
         for row in np.argsort(self._at_least[:, tick]):
             if self._at_least[row, tick] >= best:
                 break
-            bound = best + _AHEAD
+            bound = best + AHEAD_M
             other, T_AB = self._surfaces.trees[self.links[row]], self._T_AB[row][tick]
             distance = min(self._trees[row].distance(other, T_AB, bound)[0], bound)
             sweep = self._sweeps[row]

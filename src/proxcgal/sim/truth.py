@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 #: Looked for beyond the least distance so far, so that a far pair is not asked at every tick [m].
-_AHEAD = 0.05
+AHEAD_M = 0.05
 
 
 class Truth:
@@ -104,7 +104,7 @@ class _OwnDistance:
         for row in np.argsort(self._at_least):
             if self._at_least[row] >= self._least:
                 break
-            bound = self._least + _AHEAD
+            bound = self._least + AHEAD_M
             found = trees[a[row]].distance(trees[b[row]], T_AB[row], bound)[0]
             distance = min(found, bound)
             self._last[row] = self._at_least[row] = distance

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -23,6 +22,7 @@ from proxcgal.study.campaign import Campaign, Trial, plain
 from proxcgal.study.draws import draw_scene
 from proxcgal.study.jobs import Report
 from proxcgal.study.kind import Kind, Wishes
+from proxcgal.study.paired import ends_of, pairs
 from proxcgal.study.static_words import captions, figures, listings, verdicts
 from proxcgal.study.store import Row
 from proxcgal.study.trials import identity, robot_of, simulate
@@ -118,18 +118,11 @@ def analyse(table: pl.DataFrame, campaign: Campaign) -> Summary:
     """The numbers of `summary.json`: per scene and controller, and paired over the draws.
 
     `gain_mm` is the true distance at the end (mean of the last 2 s), wb over sm; `sensing_cost_mm`
-    the same, wb_known over wb. Only draws that all three controllers ended count there.
+    the same, wb_known over wb. Each counts the draws that both of its controllers ended.
     """
     scenes = {}
     for (scene,), own in table.group_by(["scene"], maintain_order=True):
-        ends = {
-            name: dict(
-                own.filter(pl.col("controller") == name, pl.col("error").is_null())
-                .select("draw", "true_final_m")
-                .iter_rows()
-            )
-            for name in CONTROLLERS
-        }
+        ends = ends_of(own)
         scenes[str(scene)] = {
             "draws": own["draw"].n_unique(),
             "redrawn": campaign.notes["redrawn"][scene],
@@ -137,8 +130,8 @@ def analyse(table: pl.DataFrame, campaign: Campaign) -> Summary:
                 str(name): _controller(part)
                 for (name,), part in own.group_by(["controller"], maintain_order=True)
             },
-            "gain_mm": _paired(ends["wb"], ends["sm"]),
-            "sensing_cost_mm": _paired(ends["wb_known"], ends["wb"]),
+            "gain_mm": _paired(pairs(ends, "wb", "sm").apart_mm),
+            "sensing_cost_mm": _paired(pairs(ends, "wb_known", "wb").apart_mm),
         }
     return {
         "robot": campaign.trials[0].scenario.robot,
@@ -175,10 +168,8 @@ def _spread(values: Any) -> dict[str, float]:
     return dict(zip(names, np.percentile(values, [0, 5, 50, 95, 100]).tolist(), strict=True))
 
 
-def _paired(more: Mapping[int, float], less: Mapping[int, float]) -> Summary | None:
-    """Distribution of a difference over the draws that both have [mm]; None without any."""
-    draws = sorted(more.keys() & less.keys())
-    apart = [1000.0 * (more[d] - less[d]) for d in draws if NOTHING_M not in (more[d], less[d])]
+def _paired(apart: list[float]) -> Summary | None:
+    """Distribution of a difference over the draws [mm]; None without any."""
     interval = median_interval(apart)
     if interval is None:
         return None

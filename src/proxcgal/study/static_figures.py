@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import polars as pl
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from proxcgal.sim.trial_log import TOO_CLOSE
-from proxcgal.study.analysis import NOTHING_M
 from proxcgal.study.bootstrap import median_interval
 from proxcgal.study.figures import COLOURS, DPI, GREY, LEGEND, NAMES
+from proxcgal.study.paired import Ends, Pairs, ends_of, pairs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from numpy.typing import NDArray
 
 _DOTTED: Any = (0, (1, 1.5))
 _GAIN, _COST = "#333333", "#CC79A7"
@@ -29,11 +27,7 @@ def scene_figure(scene: str, table: pl.DataFrame) -> Figure:
         scene: its name, above the figure.
         table: its trials; those that failed, or see no panel, are left out.
     """
-    done = table.filter(pl.col("error").is_null(), pl.col("true_final_m") < NOTHING_M)
-    ends = {
-        str(name): dict(part.select("draw", "true_final_m").iter_rows())
-        for (name,), part in done.group_by(["controller"], maintain_order=True)
-    }
+    ends = ends_of(table)
     figure = Figure(figsize=(10.2, 3.7), dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
     figure.suptitle(
@@ -41,7 +35,7 @@ def scene_figure(scene: str, table: pl.DataFrame) -> Figure:
     )
     axes = figure.subplots(1, 3, width_ratios=(1.1, 1.0, 1.1))
     _ends(axes[0], ends)
-    _pairs(axes[1], *_both(ends, "wb", "sm"))
+    _pairs(axes[1], pairs(ends, "wb", "sm"))
     _differences(axes[2], ends)
     for letter, ax in zip("abc", axes, strict=True):
         ax.tick_params(labelsize=9)
@@ -55,16 +49,7 @@ def scene_figure(scene: str, table: pl.DataFrame) -> Figure:
     return figure
 
 
-def _both(
-    ends: dict[str, dict[int, float]], one: str, other: str
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Both controllers' ends in the draws that both have [m]."""
-    first, second = ends.get(one, {}), ends.get(other, {})
-    draws = sorted(first.keys() & second.keys())
-    return np.array([first[d] for d in draws]), np.array([second[d] for d in draws])
-
-
-def _ends(ax: Axes, ends: dict[str, dict[int, float]]) -> None:
+def _ends(ax: Axes, ends: Ends) -> None:
     for name, by_draw in ends.items():
         ax.ecdf(
             list(by_draw.values()), color=COLOURS.get(name, "black"), label=NAMES.get(name, name),
@@ -76,10 +61,10 @@ def _ends(ax: Axes, ends: dict[str, dict[int, float]]) -> None:
     ax.set_ylabel("share of draws [-]", fontsize=10)
 
 
-def _pairs(ax: Axes, wb: NDArray[np.float64], sm: NDArray[np.float64]) -> None:
-    top = 1.05 * max([0.1, *wb, *sm])
+def _pairs(ax: Axes, both: Pairs) -> None:
+    top = 1.05 * max([0.1, *both.one, *both.other])
     ax.plot((0.0, top), (0.0, top), color=GREY, linewidth=1.0, linestyle=_DOTTED)
-    ax.scatter(sm, wb, s=14, color=COLOURS["wb"], alpha=0.6, linewidths=0.0)
+    ax.scatter(both.other, both.one, s=14, color=COLOURS["wb"], alpha=0.6, linewidths=0.0)
     ax.set_xlim(0.0, top)
     ax.set_ylim(0.0, top)
     ax.set_aspect("equal")
@@ -87,14 +72,13 @@ def _pairs(ax: Axes, wb: NDArray[np.float64], sm: NDArray[np.float64]) -> None:
     ax.set_ylabel("wb, true distance at the end [m]", fontsize=10)
 
 
-def _differences(ax: Axes, ends: dict[str, dict[int, float]]) -> None:
+def _differences(ax: Axes, ends: Ends) -> None:
     for one, other, colour, label in (
         ("wb", "sm", _GAIN, "gain, WB - SM"),
         ("wb_known", "wb", _COST, "cost of sensing, known - WB"),
     ):
-        first, second = _both(ends, one, other)
-        apart = 1000.0 * (first - second)
-        interval = median_interval(apart.tolist())
+        apart = pairs(ends, one, other).apart_mm
+        interval = median_interval(apart)
         if interval is not None:
             ax.ecdf(apart, color=colour, label=label, linewidth=1.6)
             ax.axvspan(interval.low, interval.high, color=colour, alpha=0.18, linewidth=0.0)

@@ -60,19 +60,23 @@ def sweep_table(comparisons: Sequence[Comparison]) -> str:
 
 
 def cycle_verdict(comparisons: Sequence[Comparison]) -> str:
-    """Where the literal form, both algorithms on one scan, misses the sensors' cycle, in words."""
-    times: dict[tuple[str, int, str], dict[int, float]] = {}
+    """Where both forms, both algorithms on one scan, miss the sensors' cycle, in words."""
+    cells: dict[tuple[str, int, str], tuple[float, float]] = {}
     for c in comparisons:
-        times.setdefault((c.robot, c.vertices, c.cloud), {})[c.algorithm] = c.paper_us
+        place = (c.robot, c.vertices, c.cloud)
+        paper, fast = cells.get(place, (0.0, 0.0))
+        cells[place] = (paper + c.paper_us, fast + c.fast_us)
     missed = [
-        f"{robot}, {vertices} vertices, {cloud} cloud: {sum(of.values()) / 1000.0:.0f} ms"
-        for (robot, vertices, cloud), of in times.items()
-        if sum(of.values()) > CYCLE_US
+        f"{robot}, {vertices} vertices, {cloud} cloud: {paper / 1000.0:.0f} ms"
+        for (robot, vertices, cloud), (paper, _) in cells.items()
+        if paper > CYCLE_US
     ]
+    most = max((fast for _, fast in cells.values()), default=0.0)
+    ours = f"The accelerated form takes at most {most / 1000.0:.2f} ms."
     budget = f"the paper's {CYCLE_US / 1000.0:g} ms"
     if not missed:
-        return f"The literal form, both algorithms together, stays within {budget} in every cell."
+        return f"The literal form, both algorithms together, stays within {budget}. {ours}"
     return (
         f"The literal form, both algorithms together, misses {budget} in {len(missed)} of "
-        f"{len(times)} cells: {'; '.join(missed)}."
+        f"{len(cells)} cells: {'; '.join(missed)}. {ours}"
     )

@@ -1,0 +1,43 @@
+"""Controllers beside one another on the same draws."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from proxcgal.study.analysis import NOTHING_M
+
+Ends = Mapping[str, Mapping[int, float]]
+
+
+@dataclass(frozen=True, slots=True)
+class Pairs:
+    """True distances at the end of the draws that both controllers ended, (n,) each [m]."""
+
+    one: NDArray[np.float64]
+    other: NDArray[np.float64]
+
+    @property
+    def apart_mm(self) -> list[float]:
+        """How much farther away the first ends [mm]."""
+        return [float(apart) for apart in 1000.0 * (self.one - self.other)]
+
+
+def ends_of(table: pl.DataFrame) -> Ends:
+    """True distance at the end by controller and draw; trials that failed, or see nothing, not."""
+    done = table.filter(pl.col("error").is_null(), pl.col("true_final_m") < NOTHING_M)
+    return {
+        str(name): dict(part.select("draw", "true_final_m").iter_rows())
+        for (name,), part in done.group_by(["controller"], maintain_order=True)
+    }
+
+
+def pairs(ends: Ends, one: str, other: str) -> Pairs:
+    """Both controllers' ends in the draws that both have."""
+    first, second = ends.get(one, {}), ends.get(other, {})
+    draws = sorted(first.keys() & second.keys())
+    return Pairs(np.array([first[d] for d in draws]), np.array([second[d] for d in draws]))
