@@ -212,10 +212,11 @@ void bind_skin(nb::module_& m) {
   m.def("zone_directions", &zone_directions, "model"_a,
         "(64, 3) point of each zone at range 1 m, in the sensor's frame: [WA] eq. (1). Zone = 8 "
         "row + column.");
-  m.def("sense", &sense, "model"_a, "scan"_a,
-        "The sense stage alone, of the zones with a target inside the workspace: zones (n,), points "
-        "(n, 3) in the sensor's frame, ranges (n,) along the rays and their standard deviations "
-        "(n,) [m].");
+  m.def(
+      "sense", &sense, "model"_a, "scan"_a,
+      "The sense stage alone, of the zones with a target inside the workspace: zones (n,), points "
+      "(n, 3) in the sensor's frame, ranges (n,) along the rays and their standard deviations "
+      "(n,) [m].");
   nb::class_<Mount>(m, "Mount", "Where one sensor sits: its frame in the link's, z looking out.")
       .def(
           "__init__",
