@@ -19,9 +19,9 @@ def test_draws_meet_what_is_promised_of_them() -> None:
         draw = draw_scene(base, robot, 7, number)
         redrawn += draw.redrawn.total()
         scenario, panel = draw.scenario, draw.scenario.obstacles[0]
-        distance, _, own = Truth(robot, scenario.obstacles)(np.array(scenario.q0))
-        assert distance >= 0.3
-        assert own >= 0.03
+        true = Truth(robot, scenario.scene())(np.array(scenario.q0))
+        assert true.distance >= 0.3
+        assert true.own >= 0.03
         np.testing.assert_array_less(
             np.abs(np.subtract(panel.position, base.obstacles[0].position)), 0.1001
         )

@@ -15,7 +15,7 @@ from mcap.records import Message
 
 import proxcgal as px
 from proxcgal.sim import foxglove, packing
-from proxcgal.sim.boxes import rotation
+from proxcgal.sim.frames import rotation
 from proxcgal.sim.recording import Recorder, Recording, Settings, read_recording
 from proxcgal.sim.scenario import load_scenario
 from proxcgal.sim.ticks import Found, TaskResult, Tick, TickInput, TickResult, TickTruth
@@ -68,6 +68,7 @@ def write(path: Path, ticks: int, settings: Settings = SETTINGS) -> list[Tick]:
             if tick.given.scans:
                 cloud = np.arange(30.0).reshape(10, 3)
                 arrow = (tick.result.surface_W, tick.result.obstacle_W)
+                recorder.show_scene(tick.given.time, SCENARIO.scene(), tick.given.time)
                 recorder.show(tick.given.time, cloud, ["a"], np.eye(4)[None], arrow)
             recorder.write(tick)
     assert recorder.failure is None
@@ -127,7 +128,7 @@ def test_mcaps_own_reader_reads_every_message_as_json(tmp_path: Path) -> None:
             assert set(content) <= {*json.loads(schema.data).get("properties", content)}
             topics.setdefault(channel.topic, []).append((schema.name, content, message))
     assert {topic: len(messages) for topic, messages in topics.items()} == {
-        "/tick": 15, "/cloud": 3, "/links": 3, "/scene": 4,
+        "/tick": 15, "/cloud": 3, "/links": 3, "/scene": 6,
     }  # fmt: skip
     assert {topic: messages[0][0] for topic, messages in topics.items()} == {
         "/tick": "proxcgal.Tick",

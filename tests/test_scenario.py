@@ -1,10 +1,8 @@
 """Scenario files: what is valid, and how everything that is not gets told."""
 
-import math
 import tomllib
 from pathlib import Path
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -12,7 +10,7 @@ from pydantic import BaseModel
 
 from proxcgal import _core
 from proxcgal.errors import ConfigError
-from proxcgal.sim import boxes, toml
+from proxcgal.sim import toml
 from proxcgal.sim.scenario import Scenario, list_scenarios, load_scenario, parse_scenario
 from proxcgal.sim.scenario_problems import models_in
 
@@ -233,23 +231,6 @@ VALUES = st.recursive(
 @given(st.dictionaries(st.from_regex(r"[a-z_]{1,8}", fullmatch=True), VALUES, max_size=5))
 def test_written_toml_reads_back_exactly(table: dict[str, object]) -> None:
     assert repr(tomllib.loads(toml.write({"top": table}))["top"]) == repr(table)
-
-
-def test_box_surface_is_closed_and_points_outward() -> None:
-    vertices, triangles = boxes.surface((0.2, 0.4, 0.6), np.eye(4))
-    corners = vertices[triangles]
-    volume = np.einsum("ni,ni->n", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
-    assert math.isclose(volume.sum(), 0.2 * 0.4 * 0.6)
-
-
-def test_box_points_lie_on_its_surface_no_farther_apart_than_asked() -> None:
-    T_WO = boxes.pose((1.0, 2.0, 3.0), (0.3, -0.4, 0.5))
-    size, spacing = (0.02, 0.5, 0.31), 0.05
-    points = boxes.points(size, T_WO, spacing)
-    distances, _, _ = _core.MeshTree(*boxes.surface(size, T_WO)).closest(points)
-    assert distances.max() < 1e-12
-    others = np.linalg.norm(points[:, None] - points[None], axis=2) + 9.0 * np.eye(len(points))
-    assert others.min(axis=1).max() <= spacing + 1e-12
 
 
 def rows_of(model: type[BaseModel], path: str = "") -> list[str]:

@@ -136,7 +136,7 @@ def test_known_perception_gives_every_controller_the_scene_itself(ur10e: px.Robo
 
 
 def test_known_points_cover_the_scenes_surfaces(ur10e: px.Robot) -> None:
-    points = Setup.of(load_scenario("front_plane"), ur10e).known_points(0.05)
+    points = Setup.of(load_scenario("front_plane"), ur10e).known_cloud(0.05)(0.0)
     assert points[:, 0].min() == pytest.approx(0.817)
     assert points[:, 0].max() == pytest.approx(0.837)
     assert len(points) > 2 * 400

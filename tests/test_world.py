@@ -8,11 +8,12 @@ import trimesh
 from numpy.typing import NDArray
 
 import proxcgal as px
-from proxcgal.sim import boxes
 from proxcgal.sim.decisive import decisive_truth
+from proxcgal.sim.frames import placed
 from proxcgal.sim.ranges import NO_TARGET, VALID, RangeModel
 from proxcgal.sim.scenario import load_scenario
 from proxcgal.sim.scenario_keys import Obstacle, Sensor, Simulation
+from proxcgal.sim.scene import ObstacleScene
 from proxcgal.sim.setup import Setup
 from proxcgal.sim.source import SimulatedSource
 from proxcgal.sim.surfaces import ALWAYS_NEAR, Surfaces
@@ -23,6 +24,8 @@ Array = NDArray[np.float64]
 
 Q = np.array([0.3, -1.7, 1.9, -1.7, -1.57, 0.2])
 PANEL = Obstacle(size=(0.02, 1.0, 1.0), position=(0.9, 0.1, 0.6), rpy=(0.1, 0.2, 0.3))
+BESIDE_PANEL = ObstacleScene([PANEL])
+ALONE = ObstacleScene([])
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +35,7 @@ def ur10e() -> px.Robot:
 
 @pytest.fixture(scope="module")
 def world(ur10e: px.Robot) -> World:
-    return World(ur10e, [PANEL])
+    return World(ur10e, BESIDE_PANEL)
 
 
 def rays(n: int, seed: int = 0) -> tuple[Array, Array]:
@@ -51,7 +54,13 @@ def surfaces_in_world(robot: px.Robot, q: Array) -> list[tuple[Array, Array]]:
     for name, pose in zip(robot.link_names, robot.link_poses(q), strict=True):
         vertices, triangles = robot.full_mesh(name)
         out.append((vertices @ pose[:3, :3].T + pose[:3, 3], triangles))
-    return [*out, boxes.surface(PANEL.size, PANEL.pose())]
+    return [*out, surface_of(PANEL)]
+
+
+def surface_of(obstacle: Obstacle) -> tuple[Array, NDArray[np.int32]]:
+    """Vertices in world and triangles of its core."""
+    vertices_O, triangles = obstacle.solid().core()
+    return placed(obstacle.pose(), vertices_O), triangles
 
 
 def test_rays_hit_where_our_own_trees_say(ur10e: px.Robot, world: World) -> None:
@@ -72,12 +81,12 @@ def test_rays_hit_where_our_own_trees_say(ur10e: px.Robot, world: World) -> None
 def test_a_robots_second_world_has_its_own_obstacles(ur10e: px.Robot, world: World) -> None:
     """MuJoCo's model of a robot is compiled once; boxes are put into copies of it."""
     moved = Obstacle(size=(0.4, 0.03, 0.7), position=(0.5, -0.4, 0.9), rpy=(0.5, -0.2, 1.0))
-    second = World(ur10e, [moved])
+    second = World(ur10e, ObstacleScene([moved]))
     origins, directions = rays(1500, seed=6)
     for each, box in ((world, PANEL), (second, moved)):
         each.place(Q)
         hits = each.cast(origins, directions[:, None])
-        tree = px.MeshTree(*boxes.surface(box.size, box.pose()))
+        tree = px.MeshTree(*surface_of(box))
         alone = tree.first_hit(origins, directions)
         on_box = np.isfinite(hits.length[:, 0]) & ~hits.robot[:, 0]
         assert on_box.sum() > 20
@@ -234,7 +243,7 @@ def test_scans_are_taken_where_the_arm_was_at_their_stamp(ur10e: px.Robot) -> No
     quiet = ["simulation.sigma_floor=0", "simulation.sigma_ratio=0", "simulation.dropout=0"]
     scenario = load_scenario("front_plane", [*quiet, "duration=0.3"])
     setup = Setup.of(scenario, ur10e)
-    source = SimulatedSource(setup, World(ur10e, scenario.obstacles), 0)
+    source = SimulatedSource(setup, World(ur10e, scenario.scene()), 0)
     qd = np.array([0.4, 0.3, -0.2, 0.5, 0.1, 0.0])
     scans = []
     while (given := source.read()) is not None:
@@ -244,7 +253,7 @@ def test_scans_are_taken_where_the_arm_was_at_their_stamp(ur10e: px.Robot) -> No
         source.command(qd)
     assert sorted({scan.stamp for scan in scans}) == [k / 15.0 for k in range(5)]
     assert len(scans) == 5 * len(setup.skin)
-    still = World(ur10e, scenario.obstacles)
+    still = World(ur10e, scenario.scene())
     for scan in scans[-3:]:
         q = setup.q0 + qd * scan.stamp
         still.place(q)
@@ -259,7 +268,7 @@ def test_scans_are_taken_where_the_arm_was_at_their_stamp(ur10e: px.Robot) -> No
 
 def test_staggered_sensors_take_turns(ur10e: px.Robot) -> None:
     scenario = load_scenario("front_plane", ["simulation.stagger=true", "duration=0.2"])
-    source = SimulatedSource(Setup.of(scenario, ur10e), World(ur10e, scenario.obstacles), 0)
+    source = SimulatedSource(Setup.of(scenario, ur10e), World(ur10e, scenario.scene()), 0)
     stamps: dict[int, list[float]] = {}
     while (given := source.read()) is not None:
         for scan in given.scans:
@@ -271,12 +280,12 @@ def test_staggered_sensors_take_turns(ur10e: px.Robot) -> None:
 
 
 def test_true_distance_never_exceeds_that_to_dense_samples_of_the_panel(ur10e: px.Robot) -> None:
-    truth = Truth(ur10e, [PANEL])
-    points = boxes.points(PANEL.size, PANEL.pose(), 0.01)
+    truth = Truth(ur10e, BESIDE_PANEL)
+    points = placed(PANEL.pose(), PANEL.solid().points(0.01))
     generator = np.random.default_rng(3)
     for _ in range(3):
         q = Q + generator.uniform(-0.3, 0.3, 6)
-        distance, link, _ = truth(q)
+        distance, link = truth(q)[:2]
         poses = dict(zip(ur10e.link_names, ur10e.link_poses(q), strict=True))
         T = np.linalg.inv(poses[link])
         sampled = px.MeshTree(*ur10e.full_mesh(link)).closest(points @ T[:3, :3].T + T[:3, 3])[0]
@@ -286,37 +295,41 @@ def test_true_distance_never_exceeds_that_to_dense_samples_of_the_panel(ur10e: p
 
 def test_true_distance_skips_nothing_on_a_moving_arm(ur10e: px.Robot) -> None:
     """The bound that saves work must not change the answer."""
-    moving = Truth(ur10e, [PANEL])
+    moving = Truth(ur10e, BESIDE_PANEL)
     qd = np.array([0.3, 0.4, -0.5, 0.2, 0.3, 0.1])
     own = []
     for k in range(60):
         q = Q + 0.01 * k * qd
-        distance, link, own_distance = moving(q)
+        distance, link, own_distance = moving(q)[:3]
         own.append(own_distance)
         if k % 10 == 0:
-            fresh, fresh_link, fresh_own = Truth(ur10e, [PANEL])(q)
+            fresh, fresh_link, fresh_own = Truth(ur10e, BESIDE_PANEL)(q)[:3]
             assert (distance, link) == (pytest.approx(fresh, abs=1e-12), fresh_link)
             assert min(own) <= fresh_own + 1e-12
 
 
 def test_own_distance_reaches_its_least_exactly(ur10e: px.Robot) -> None:
-    truth = Truth(ur10e, [])
+    truth = Truth(ur10e, ALONE)
     path = [Q + np.array([0.0, 0.0, 0.02 * k, 0.0, 0.0, 0.0]) for k in range(25)]
     least = min(truth(q)[2] for q in path)
-    assert least == pytest.approx(min(Truth(ur10e, [])(q)[2] for q in path[::4] + path[-1:]))
+    assert least == pytest.approx(min(Truth(ur10e, ALONE)(q)[2] for q in path[::4] + path[-1:]))
 
 
-def test_truth_where_it_decides_is_the_truth_of_every_tick(ur10e: px.Robot) -> None:
+@pytest.mark.parametrize("moves", [False, True])
+def test_truth_where_it_decides_is_the_truth_of_every_tick(ur10e: px.Robot, moves: bool) -> None:
     """What the bounds leave out is no new least, no violation and not wanted."""
-    panel = PANEL.model_copy(update={"position": (0.78, 0.1, 0.6)})
+    position = (0.78, 0.1, 0.6)
+    path = ((0.0, *position), (0.6, 0.85, 0.1, 0.6), (1.0, 0.78, 0.3, 0.6)) if moves else ()
+    scene = ObstacleScene([PANEL.model_copy(update={"position": position, "path": path})])
+    time = 0.01 * np.arange(120)
     qd = np.array([0.3, 0.4, -0.5, 0.2, 0.3, 0.1])
     q = np.array([Q + 0.4 * np.sin(0.05 * k) * qd for k in range(120)])
     wanted = np.arange(len(q)) >= 100
-    truth = Truth(ur10e, [panel])
-    every = [truth(posture) for posture in q]
+    truth = Truth(ur10e, scene)
+    every = [truth(posture, moment) for posture, moment in zip(q, time, strict=True)]
     distance = np.array([tick[0] for tick in every])
     under = float(np.quantile(distance, 0.2))
-    found = decisive_truth(ur10e, [panel], q, wanted, under)
+    found = decisive_truth(ur10e, scene, time, q, wanted, under)
     asked = ~np.isnan(found.distance)
     assert asked[wanted].all()
     assert asked[distance < under].all()

@@ -41,12 +41,13 @@ def _draw_pairs(scenario: Scenario, logs: Sequence[TrialLog], folder: Path) -> s
     from proxcgal.study.pairs import pair_figure, sensor_view, whole_body_view
 
     setup = Setup.of(scenario)
-    points_W = setup.known_points()
-    if not len(points_W):
+    if not setup.scene.solids:
         return ""
     log = next((log for log in logs if log.controller == "wb"), logs[0])
     tick = int(np.argmin(log.true_m))
-    q, drawn = log.q[tick], setup.known_points(DRAWN_SPACING_M)
+    elapsed = float(log.elapsed[tick])
+    points_W = setup.known_cloud()(elapsed)
+    q, drawn = log.q[tick], setup.known_cloud(DRAWN_SPACING_M)(elapsed)
     views = [
         whole_body_view(setup.robot, q, points_W, drawn_W=drawn, title="whole body (WB)"),
         sensor_view(

@@ -6,7 +6,6 @@ no new least and no violation is not asked: least values, counts and what is ask
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -14,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxcgal import _core
-from proxcgal.sim import boxes
-from proxcgal.sim.surfaces import Surfaces, inverse, moved
-from proxcgal.sim.truth import AHEAD_M
+from proxcgal.sim.frames import inverse
+from proxcgal.sim.surfaces import Surfaces, moved
+from proxcgal.sim.truth import AHEAD_M, solid_distance
 
 if TYPE_CHECKING:
     from proxcgal.models.robots import Robot
-    from proxcgal.sim.scenario_keys import Obstacle
+    from proxcgal.sim.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -35,13 +34,14 @@ class DecisiveTruth:
 
 
 def decisive_truth(
-    robot: Robot, obstacles: Sequence[Obstacle], q: Array, wanted: NDArray[np.bool_], under: float
+    robot: Robot, scene: Scene, time: Array, q: Array, wanted: NDArray[np.bool_], under: float
 ) -> DecisiveTruth:
     """Distances to the scene and between own links, as `Truth` has them, where they decide.
 
     Args:
         robot: its full meshes are asked.
-        obstacles: the scene.
+        scene: what stands and moves.
+        time: (n,) [s] of each tick, in the scene's time.
         q: (n, n_q) posture of each tick.
         wanted: (n,) ticks at which the distance to the scene is asked in any case.
         under: so is it wherever it is smaller than this [m].
@@ -49,20 +49,21 @@ def decisive_truth(
     surfaces = Surfaces.of(robot)
     poses_W = np.array([robot.link_poses(posture) for posture in q]).reshape(len(q), -1, 4, 4)
     moving = np.array(surfaces.moving, np.intp)
-    scene = _Pairs(surfaces, len(q))
-    for box in obstacles:
-        tree = _core.MeshTree(*boxes.surface(box.size, np.eye(4)))
+    apart = _Pairs(surfaces, len(q))
+    T_OW = inverse(np.array([scene.poses(moment) for moment in time]).reshape(len(q), -1, 4, 4))
+    for row, solid in enumerate(scene.solids):
+        tree = _core.MeshTree(*solid.core())
         for link in moving:
-            scene.add(tree, int(link), inverse(box.pose()) @ poses_W[:, link])
-    scene.ask_least(under)
-    scene.ask(np.flatnonzero(wanted))
+            apart.add(tree, int(link), T_OW[:, row] @ poses_W[:, link], solid.rounding)
+    apart.ask_least(under)
+    apart.ask(np.flatnonzero(wanted))
     own = _Pairs(surfaces, len(q))
     for a, b in surfaces.self_pairs:
         own.add(surfaces.trees[a], int(b), inverse(poses_W[:, a]) @ poses_W[:, b])
     own.ask_least(0.0)
     names = robot.link_names
-    link = [names[scene.links[row]] if row >= 0 else "" for row in scene.nearest]
-    return DecisiveTruth(scene.distance, link, own.distance)
+    link = [names[apart.links[row]] if row >= 0 else "" for row in apart.nearest]
+    return DecisiveTruth(apart.distance, link, own.distance)
 
 
 class _Pairs:
@@ -71,6 +72,7 @@ class _Pairs:
     def __init__(self, surfaces: Surfaces, ticks: int) -> None:
         self._surfaces = surfaces
         self._trees: list[_core.MeshTree] = []
+        self._rounding: list[float] = []
         self._T_AB: list[Array] = []
         self._sweeps: list[Array] = []
         self._at_least = np.zeros((0, ticks))
@@ -78,9 +80,10 @@ class _Pairs:
         self.distance = np.full(ticks, np.nan)
         self.nearest = np.full(ticks, -1)
 
-    def add(self, tree: _core.MeshTree, link: int, T_AB: Array) -> None:
-        """A surface and a link with its pose (n, 4, 4) in that surface's frame."""
+    def add(self, tree: _core.MeshTree, link: int, T_AB: Array, rounding: float = 0.0) -> None:
+        """A surface, rounded, and a link with its pose (n, 4, 4) in that surface's frame."""
         self._trees.append(tree)
+        self._rounding.append(rounding)
         self._T_AB.append(T_AB)
         self._sweeps.append(self._surfaces.sweep(np.full(len(T_AB), link), T_AB))
         self._at_least = np.pad(self._at_least, ((0, 1), (0, 0)))
@@ -115,7 +118,8 @@ class _Pairs:
                 break
             bound = best + AHEAD_M
             other, T_AB = self._surfaces.trees[self.links[row]], self._T_AB[row][tick]
-            distance = min(self._trees[row].distance(other, T_AB, bound)[0], bound)
+            found = solid_distance(self._trees[row], self._rounding[row], other, T_AB, bound)[0]
+            distance = min(found, bound)
             sweep = self._sweeps[row]
             nearer = distance - moved(sweep[tick : tick + 1], sweep)
             np.maximum(self._at_least[row], nearer, out=self._at_least[row])

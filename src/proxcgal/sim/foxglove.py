@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from proxcgal.sim.solids import Box, Cylinder, Solid, Sphere
+
 Array = NDArray[np.float64]
 Schema = dict[str, Any]
 
@@ -52,12 +54,19 @@ _ARROW = _object(
     head_length=_NUMBER, head_diameter=_NUMBER, color=_COLOR,
 )  # fmt: skip
 _CUBE = _object("foxglove.CubePrimitive", pose=_POSE, size=_VECTOR, color=_COLOR)
-_OTHER_PRIMITIVES = ("spheres", "cylinders", "lines", "triangles", "texts", "models")
+_SPHERE = _object("foxglove.SpherePrimitive", pose=_POSE, size=_VECTOR, color=_COLOR)
+_CYLINDER = _object(
+    "foxglove.CylinderPrimitive", pose=_POSE, size=_VECTOR, bottom_scale=_NUMBER,
+    top_scale=_NUMBER, color=_COLOR,
+)  # fmt: skip
+_OTHER_PRIMITIVES = ("lines", "triangles", "texts", "models")
 _ENTITY = _object(
     "foxglove.SceneEntity", timestamp=_TIME, frame_id=_TEXT, id=_TEXT, lifetime=_DURATION,
     frame_locked={"type": "boolean"}, metadata=_list({"type": "object"}), arrows=_list(_ARROW),
-    cubes=_list(_CUBE), **{name: _list({"type": "object"}) for name in _OTHER_PRIMITIVES},
+    cubes=_list(_CUBE), spheres=_list(_SPHERE), cylinders=_list(_CYLINDER),
+    **{name: _list({"type": "object"}) for name in _OTHER_PRIMITIVES},
 )  # fmt: skip
+_PRIMITIVES = ("arrows", "cubes", "spheres", "cylinders", *_OTHER_PRIMITIVES)
 _DELETION = _object("foxglove.SceneEntityDeletion", timestamp=_TIME, type=_WHOLE, id=_TEXT)
 
 #: Schema of each topic beside the ticks.
@@ -117,18 +126,36 @@ def pair_arrow(time: float, tail_W: Sequence[float] | None, tip_W: Sequence[floa
     return _json(deletions=[], entities=[_entity(time, "closest_pair", arrows=[arrow])])
 
 
-def boxes(time: float, named: Sequence[tuple[str, Array, Sequence[float]]]) -> bytes:
-    """foxglove.SceneUpdate of boxes: name, pose (4, 4), edge lengths [m]."""
-    color = dict(zip("rgba", (0.93, 0.68, 0.38, 0.6), strict=True))
-    entities = [
-        _entity(time, name, cubes=[{"pose": _pose(T), "size": _vector(size), "color": color}])
-        for name, T, size in named
-    ]
+def solids(time: float, named: Sequence[tuple[str, Solid, Array]]) -> bytes:
+    """foxglove.SceneUpdate of solids: name, shape, pose (4, 4)."""
+    entities = [_entity(time, name, **_primitives(solid, T)) for name, solid, T in named]
     return _json(deletions=[], entities=entities)
 
 
+def _primitives(solid: Solid, T_WO: Array) -> dict[str, Any]:
+    """What Foxglove has for a shape: a capsule is a cylinder and two spheres."""
+
+    def at(height: float, *size: float) -> dict[str, Any]:
+        T = T_WO.copy()
+        T[:3, 3] += height * T[:3, 2]
+        color = dict(zip("rgba", (0.93, 0.68, 0.38, 0.6), strict=True))
+        return {"pose": _pose(T), "size": _vector(size), "color": color}
+
+    if isinstance(solid, Box):
+        return {"cubes": [at(0.0, *solid.size)]}
+    width = 2.0 * solid.radius
+    if isinstance(solid, Sphere):
+        return {"spheres": [at(0.0, width, width, width)]}
+    height = solid.height if isinstance(solid, Cylinder) else solid.length
+    tube = at(0.0, width, width, height) | {"bottom_scale": 1.0, "top_scale": 1.0}
+    if isinstance(solid, Cylinder):
+        return {"cylinders": [tube]}
+    ends = [at(0.5 * side * height, width, width, width) for side in (-1.0, 1.0)]
+    return {"cylinders": [tube], "spheres": ends}
+
+
 def _entity(time: float, name: str, **primitives: Any) -> dict[str, Any]:
-    empty: dict[str, list[Any]] = {kind: [] for kind in ("arrows", "cubes", *_OTHER_PRIMITIVES)}
+    empty: dict[str, list[Any]] = {kind: [] for kind in _PRIMITIVES}
     return {
         "timestamp": _time(time), "frame_id": WORLD, "id": name, "frame_locked": False,
         "lifetime": {"sec": 0, "nsec": 0}, "metadata": [], **empty, **primitives,

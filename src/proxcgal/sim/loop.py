@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Iterator
+from itertools import count
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxcgal import _core
 from proxcgal.sim.faults import FaultInjector
+from proxcgal.sim.scene import Cloud, FixedCloud
 from proxcgal.sim.source import Source
 from proxcgal.sim.ticks import TickInput, TickResult
 
@@ -18,7 +19,7 @@ def run_ticks(
     source: Source,
     law: _core.Controller,
     faults: FaultInjector | None = None,
-    known_points_W: NDArray[np.float64] | None = None,
+    known: Cloud | None = None,
 ) -> Iterator[tuple[TickInput, TickResult]]:
     """Tick after tick until the source ends; `law` then holds the state after the yielded one.
 
@@ -26,16 +27,21 @@ def run_ticks(
         source: of inputs; it is told each command.
         law: the controller.
         faults: between source and tick.
-        known_points_W: (n, 3) for ticks that are given the scene itself [m].
+        known: for ticks that are given the scene itself, where that is at the tick's place in the
+            run: the caller's clock may be what is faulty.
     """
-    points = np.empty((0, 3)) if known_points_W is None else known_points_W
-    while (given := source.read()) is not None:
+    cloud = FixedCloud(np.empty((0, 3))) if known is None else known
+    for tick in count():
+        if (given := source.read()) is None:
+            return
         if faults is not None:
             given = faults(given)
         scans = list(given.scans)
+        elapsed = tick * law.config.period
+        points_W = cloud(elapsed if given.known else 0.0)
         start = clock.perf_counter_ns()
         if given.known:
-            out = law.tick_known(given.time, given.q, points, given.goal)
+            out = law.tick_known(given.time, given.q, points_W, given.goal)
         else:
             out = law.tick(given.time, given.q, scans, given.goal, given.late, given.q_stamp)
         tick_us = (clock.perf_counter_ns() - start) / 1000.0

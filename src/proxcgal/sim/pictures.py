@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from proxcgal.errors import ConfigError
-from proxcgal.sim import boxes
+from proxcgal.sim.frames import inverse, placed
 from proxcgal.sim.recording import Recording
 from proxcgal.sim.replay import Replay
 from proxcgal.sim.setup import Setup
@@ -36,6 +36,7 @@ class Snapshot:
     tick: Tick
     cloud_W: Array  #: (n, 3) filtered [m]
     raw_W: Array  #: (n, 3) before body removal [m]
+    elapsed: float  #: [s] of the run
 
 
 def snapshots(
@@ -56,7 +57,8 @@ def snapshots(
     taken = {}
     for row, tick in enumerate(replay):
         if row in wanted:
-            taken[row] = Snapshot(tick, replay.law.cloud_W(), replay.law.raw_cloud_W())
+            elapsed = row * replay.law.config.period
+            taken[row] = Snapshot(tick, replay.law.cloud_W(), replay.law.raw_cloud_W(), elapsed)
         if row >= max(wanted, default=-1):
             break
     return [taken[row] for row in wanted]
@@ -66,7 +68,10 @@ def viewpoint(setup: Setup) -> Camera:
     """From beside the arm, towards the face that the nearest obstacle turns to it."""
     base_W = np.array([0.0, 0.0, 0.6])
     tool_W = np.array(setup.robot.tool_pose(setup.q0))[:3, 3]
-    faces = [boxes.nearest_point(b.size, b.pose(), base_W) for b in setup.scenario.obstacles]
+    faces = [
+        placed(T_WO, solid.nearest(placed(inverse(T_WO), base_W)))
+        for solid, T_WO in zip(setup.scene.solids, setup.scene.poses(0.0), strict=True)
+    ]
     face_W = min(faces, key=lambda point: float(np.linalg.norm(point - base_W)), default=tool_W)
     across = np.arctan2(face_W[1], face_W[0])
     middle = (base_W + tool_W + face_W) / 3.0
@@ -80,7 +85,7 @@ def draw(
     camera: Camera | None = None,
 ) -> Picture:
     """(height, width, 3) of one snapshot. Raises: SimulationError where nothing can draw."""
-    world.place(snapshot.tick.given.q)
+    world.place(snapshot.tick.given.q, snapshot.elapsed)
     return world.picture(list(_marks(snapshot)), size, camera)
 
 
@@ -110,7 +115,7 @@ def animate(
     end = recording.ticks[-1].given.time if recording.ticks else 0.0
     times = np.arange(0.0, min(end, seconds or end) + 1e-9, 1.0 / fps)
     replay = Replay(recording)
-    world = World(replay.setup.robot, replay.setup.scenario.obstacles)
+    world = World(replay.setup.robot, replay.setup.scene)
     try:
         frames = [
             Image.fromarray(draw(world, snapshot, size, camera or viewpoint(replay.setup)))

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from proxcgal.errors import ConfigError
 from proxcgal.sim import foxglove, packing
 from proxcgal.sim.scenario import Scenario
+from proxcgal.sim.scene import Scene
 from proxcgal.sim.ticks import Tick
 from proxcgal.sim.versions import versions
 
@@ -119,6 +120,15 @@ class Recorder:
             except OSError as error:
                 self._fail(error)
 
+    def show_scene(self, time: float, scene: Scene, elapsed: float) -> None:
+        """Writes where the scene's solids are at `elapsed` [s], for Foxglove."""
+        if self.failure is None:
+            try:
+                named = zip(scene.names, scene.solids, scene.poses(elapsed), strict=True)
+                self._message("/scene", time, foxglove.solids(time, list(named)))
+            except OSError as error:
+                self._fail(error)
+
     def close(self) -> None:
         """Writes the index and closes the file; one that nothing was written to is removed."""
         try:
@@ -164,8 +174,6 @@ class Recorder:
             points = io.BytesIO()
             np.save(points, settings.known_points_W)
             self._writer.add_attachment(0, 0, KNOWN_POINTS, "application/x-npy", points.getvalue())
-        placed = [(box.name, box.pose(), box.size) for box in settings.scenario.obstacles]
-        self._message("/scene", 0.0, foxglove.boxes(0.0, placed))
         self._stream.flush()
 
     def _message(self, topic: str, time: float, data: bytes) -> None:

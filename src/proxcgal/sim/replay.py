@@ -13,6 +13,7 @@ from proxcgal.errors import ConfigError
 from proxcgal.sim.loop import run_ticks
 from proxcgal.sim.recording import Recording
 from proxcgal.sim.scenario import change_scenario
+from proxcgal.sim.scene import Cloud, FixedCloud
 from proxcgal.sim.setup import Setup
 from proxcgal.sim.source import RecordedSource
 from proxcgal.sim.ticks import Tick
@@ -62,11 +63,10 @@ class Replay:
                 RuntimeWarning,
                 stacklevel=2,
             )
-        self._known = None
+        self._known: Cloud | None = None
         if self.setup.uses_known_points(self.controller):
-            self._known = settings.known_points_W
-            if self._known is None:
-                self._known = self.setup.known_points()
+            recorded = settings.known_points_W
+            self._known = self.setup.known_cloud() if recorded is None else FixedCloud(recorded)
         elif any(tick.given.known for tick in recording.ticks):
             raise ConfigError(
                 f"recording {recording.path}: was made on known points and holds no scans, which "

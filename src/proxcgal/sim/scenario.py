@@ -24,13 +24,14 @@ from proxcgal.sim.scenario_keys import (
 )
 from proxcgal.sim.scenario_law import Controller
 from proxcgal.sim.scenario_problems import lines
+from proxcgal.sim.scene import ObstacleScene, Scene
 
 #: wb: whole body; sm: sensor points; wb_known: whole body on points of the scene itself.
 CONTROLLERS = ("wb", "sm", "wb_known")
 
 
 class Scenario(Section):
-    """A scene that stands still, a robot with its sensors, and what it is to do."""
+    """A scene, a robot with its sensors, and what it is to do."""
 
     name: str = Field("unnamed", description="left out in a file: the file's own name")
     description: str = Field("", description="one line, shown in lists")
@@ -55,6 +56,10 @@ class Scenario(Section):
     simulation: Simulation = Field(default_factory=Simulation)
     obstacles: tuple[Obstacle, ...] = Field((), alias="obstacle")
     faults: tuple[Fault, ...] = Field((), alias="fault")
+
+    def scene(self) -> Scene:
+        """What stands and moves beside the robot."""
+        return ObstacleScene(self.obstacles)
 
     def to_toml(self) -> str:
         """The file that gives this scenario again, with every default written out."""

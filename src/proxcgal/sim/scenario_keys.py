@@ -7,6 +7,7 @@ the control law stand in `scenario_law`.
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -14,7 +15,8 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from proxcgal import _core
-from proxcgal.sim import boxes
+from proxcgal.sim import frames
+from proxcgal.sim.solids import Box, Capsule, Cylinder, Solid, Sphere
 
 FaultKind = Literal[
     "silent",
@@ -59,7 +61,7 @@ NonNegative = Annotated[float, Field(ge=0)]
 Share = Annotated[float, Field(ge=0, le=1)]
 Count = Annotated[int, Field(ge=1)]
 Vector = Annotated[tuple[float, ...], Field(min_length=3, max_length=3)]
-Size = Annotated[tuple[Positive, ...], Field(min_length=3, max_length=3)]
+Stop = Annotated[tuple[float, ...], Field(min_length=4, max_length=4)]
 #: May be infinite: a bound that is off.
 Bound = Annotated[float, Field(allow_inf_nan=True), AfterValidator(_not_nan)]
 
@@ -179,17 +181,56 @@ class Simulation(Section):
     )
 
 
+#: How many numbers `size` has for each shape.
+_SIZES = {"box": 3, "cylinder": 2, "capsule": 2, "sphere": 1}
+
+
 class Obstacle(Section):
-    """A box that stands still."""
+    """A solid that stands still, or moves on a path of its own."""
 
     name: str = Field("panel", description="for messages and pictures")
-    size: Size = Field(description="[m] full edge lengths")
+    shape: Literal["box", "cylinder", "capsule", "sphere"] = Field(
+        "box", description="round ones stand along their own z axis"
+    )
+    size: tuple[Positive, ...] = Field(
+        min_length=1,
+        max_length=3,
+        description="[m] box: full edge lengths x, y, z; cylinder: radius, height; capsule: "
+        "radius, length between the middles of its ends; sphere: radius",
+    )
     position: Vector = Field(description="[m] of its centre, in the base frame")
     rpy: Vector = Field((0.0, 0.0, 0.0), description="[rad] roll, pitch, yaw")
+    path: tuple[Stop, ...] = Field(
+        (),
+        description="[s, m, m, m] time and position of each stop, straight at even speed between "
+        "them, at rest before and after; left out: stands at `position`",
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if len(self.size) != _SIZES[self.shape]:
+            raise ValueError(f"size of a {self.shape} has {_SIZES[self.shape]} numbers")
+        times = [stop[0] for stop in self.path]
+        if any(later <= earlier for earlier, later in pairwise(times)):
+            raise ValueError("path must go on in time from stop to stop")
+        if self.path and self.path[0][1:] != self.position:
+            raise ValueError(f"path must begin at position = {list(self.position)}")
+        return self
+
+    def solid(self) -> Solid:
+        """Its shape."""
+        match self.shape:
+            case "box":
+                return Box(self.size)
+            case "cylinder":
+                return Cylinder(*self.size)
+            case "capsule":
+                return Capsule(*self.size)
+        return Sphere(*self.size)
 
     def pose(self) -> NDArray[np.float64]:
-        """(4, 4) T_WO of its centre."""
-        return boxes.pose(self.position, self.rpy)
+        """(4, 4) T_WO of its centre, at the start."""
+        return frames.pose(self.position, self.rpy)
 
 
 class Fault(Section):

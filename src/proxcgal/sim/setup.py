@@ -11,15 +11,16 @@ from numpy.typing import NDArray
 from proxcgal import _core
 from proxcgal.errors import ConfigError
 from proxcgal.models import Robot, load_robot, ring_skin
-from proxcgal.sim import boxes
+from proxcgal.sim import frames
 from proxcgal.sim.scenario import CONTROLLERS, Scenario
 from proxcgal.sim.scenario_keys import Section
 from proxcgal.sim.scenario_law import Controller
+from proxcgal.sim.scene import KnownCloud, Scene
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Setup:
     """Everything of a scenario that does not change while it runs."""
 
@@ -28,6 +29,7 @@ class Setup:
     skin: _core.Skin
     q0: Array  #: (n_q,)
     goal: Array  #: (4, 4) T_WT
+    scene: Scene
 
     @classmethod
     def of(cls, scenario: Scenario, robot: Robot | None = None) -> Self:
@@ -39,21 +41,22 @@ class Setup:
         """
         robot = robot or make_robot(scenario)
         q0 = _start(scenario, robot)
-        return cls(scenario, robot, make_skin(scenario, robot), q0, _goal(scenario, robot, q0))
+        return cls(
+            scenario=scenario, robot=robot, skin=make_skin(scenario, robot), q0=q0,
+            goal=_goal(scenario, robot, q0), scene=scenario.scene(),
+        )  # fmt: skip
 
     def uses_known_points(self, controller: str) -> bool:
         """Does this controller get points of the scene itself instead of scans?"""
         return controller == "wb_known" or self.scenario.perception == "known"
 
-    def known_points(self, spacing: float | None = None) -> Array:
-        """(n, 3) points of the scene's own surfaces [m].
+    def known_cloud(self, spacing: float | None = None) -> KnownCloud:
+        """Points of the scene's own surfaces, wherever those are.
 
         Args:
             spacing: they are at most this far apart [m]; left out: that of the scenario.
         """
-        spacing = spacing or self.scenario.simulation.known_spacing
-        clouds = [boxes.points(box.size, box.pose(), spacing) for box in self.scenario.obstacles]
-        return np.concatenate([*clouds, np.empty((0, 3))])
+        return KnownCloud(self.scene, spacing or self.scenario.simulation.known_spacing)
 
     def make_controller(self, controller: str, known_points: int = 0) -> _core.Controller:
         """The controller of that name, with room for that many known points.
@@ -144,7 +147,7 @@ def _goal(scenario: Scenario, robot: Robot, q0: Array) -> Array:
     elif goal.position is not None:
         T_WT[:3, 3] = goal.position
     if goal.rpy is not None:
-        T_WT[:3, :3] = boxes.rotation(goal.rpy)
+        T_WT[:3, :3] = frames.rotation(goal.rpy)
     return T_WT
 
 

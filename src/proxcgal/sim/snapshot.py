@@ -57,7 +57,7 @@ def take_snapshot(scenario: Scenario, scans: int = 1) -> Snapshot:
     long_enough = max(scenario.duration, (scans + 1) / simulation.sensor_hz)
     changed: dict[str, Any] = {"simulation": simulation, "duration": long_enough}
     setup = Setup.of(scenario.model_copy(update=changed))
-    source = SimulatedSource(setup, World(setup.robot, scenario.obstacles), scenario.seed)
+    source = SimulatedSource(setup, World(setup.robot, setup.scene), scenario.seed)
     law = setup.make_controller("wb")
     taken: list[Snapshot] = []
     while len(taken) < scans and (given := source.read()) is not None:

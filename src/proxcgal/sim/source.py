@@ -99,7 +99,7 @@ class SimulatedSource:
     def _measure(self, rows: list[int], stamp: float, q: Array) -> list[_core.Scan]:
         """Scans of the sensors that measure together; they share one index."""
         assert self._world is not None
-        self._world.place(q)
+        self._world.place(q, stamp)
         T_WS = self._setup.robot.link_poses(q)[self._links[rows]] @ self._T_LS[rows]
         directions_W = self._ranges.rays_S @ np.swapaxes(T_WS[:, :3, :3], 1, 2)
         hits = self._world.cast(T_WS[:, :3, 3], directions_W, self._mounting)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from proxcgal import _core
 from proxcgal.models.cache import Cache, Stored
+from proxcgal.sim.frames import inverse
 
 if TYPE_CHECKING:
     from proxcgal.models.robots import Robot
@@ -111,12 +112,3 @@ def moved(before: Array, after: Array) -> Array:
     centers, turns = step[:, :3], step[:, 3:]
     shifted = np.sqrt(np.einsum("ni,ni->n", centers, centers))
     return np.asarray(shifted + np.sqrt(np.einsum("ni,ni->n", turns, turns)))
-
-
-def inverse(T: Array) -> Array:
-    """Inverse of (..., 4, 4) poses."""
-    out = np.zeros_like(T)
-    out[..., :3, :3] = np.swapaxes(T[..., :3, :3], -1, -2)
-    out[..., :3, 3] = -np.einsum("...ji,...j->...i", T[..., :3, :3], T[..., :3, 3])
-    out[..., 3, 3] = 1.0
-    return out

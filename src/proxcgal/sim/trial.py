@@ -21,7 +21,7 @@ from proxcgal.sim.setup import Setup
 from proxcgal.sim.source import SimulatedSource
 from proxcgal.sim.ticks import Tick, TickTruth
 from proxcgal.sim.trial_log import TOO_CLOSE, TrialLog, final_ticks
-from proxcgal.sim.truth import Truth
+from proxcgal.sim.truth import NOT_ASKED, Truth
 from proxcgal.sim.world import World
 
 __all__ = ["CONTROLLERS", "TrialLog", "first_difference", "recompute", "run_trial"]
@@ -59,29 +59,30 @@ def run_trial(
     begin = clock.perf_counter()
     seed = scenario.seed if seed is None else seed
     setup = Setup.of(scenario, robot)
-    known = setup.known_points() if setup.uses_known_points(controller) else None
+    known = setup.known_cloud() if setup.uses_known_points(controller) else None
     law = setup.make_controller(controller, 0 if known is None else len(known))
     faults = FaultInjector(scenario.faults, [mount.name for mount in setup.skin.mounts], seed)
-    world = World(setup.robot, scenario.obstacles) if known is None else None
+    world = World(setup.robot, setup.scene) if known is None else None
     source = SimulatedSource(setup, world, seed)
-    truth = None if sparse_truth and recorder is None else Truth(setup.robot, scenario.obstacles)
+    truth = None if sparse_truth and recorder is None else Truth(setup.robot, setup.scene)
     log = None
     if recorder is not None:
         recorder.start(
             Settings(
                 scenario=scenario.model_copy(update={"seed": seed}), controller=controller,
-                seed=seed, meshes=setup.mesh_hashes(), known_points_W=known,
+                seed=seed, meshes=setup.mesh_hashes(),
+                known_points_W=known(0.0) if known is not None and known.still else None,
                 ticks=recorder.ticks,
             )
         )  # fmt: skip
-        log = _Log(recorder, setup.robot, scenario.simulation.sensor_hz)
+        log = _Log(recorder, setup, scenario.simulation.sensor_hz)
     ticks: list[Tick] = []
     period = law.config.period
     beat = max(round(0.1 * scenario.simulation.control_hz), 1)
     for given, result in run_ticks(source, law, faults, known):
-        distance, link, own = (np.nan, "", np.nan) if truth is None else truth(given.q)
         leaked = 0 if known is not None else _leaked(law, source)
-        ticks.append(Tick(given, result, TickTruth(distance, link, own, leaked)))
+        true = NOT_ASKED if truth is None else truth(given.q, len(ticks) * period)
+        ticks.append(Tick(given, result, TickTruth(true.distance, true.link, true.own, leaked)))
         if log is not None:
             log.write(ticks[-1], (len(ticks) - 1) * period, law)
         if on_progress is not None and len(ticks) % beat == 0:
@@ -103,7 +104,7 @@ def _with_truth(ticks: Sequence[Tick], elapsed: Array, setup: Setup) -> list[Tic
     """The ticks with the true distances that the summary needs."""
     q = np.array([tick.given.q for tick in ticks])
     asked = decisive_truth(
-        setup.robot, setup.scenario.obstacles, q, final_ticks(elapsed), under=TOO_CLOSE
+        setup.robot, setup.scene, elapsed, q, final_ticks(elapsed), under=TOO_CLOSE
     )
     return [
         replace(tick, truth=TickTruth(float(distance), link, float(own), tick.truth.leaked))
@@ -122,9 +123,9 @@ def _leaked(law: _core.Controller, source: SimulatedSource) -> int:
 class _Log:
     """What the recorder is told: every tick, and at the sensors' rate what Foxglove draws."""
 
-    def __init__(self, recorder: Recorder, robot: Robot, hz: float) -> None:
+    def __init__(self, recorder: Recorder, setup: Setup, hz: float) -> None:
         self._recorder = recorder
-        self._robot = robot
+        self._robot, self._scene = setup.robot, setup.scene
         self._hz = hz
         self._beats = -1
 
@@ -136,6 +137,8 @@ class _Log:
             arrow = (tick.result.control_W, tick.result.obstacle_W)
             poses = np.asarray(self._robot.link_poses(tick.given.q))
             names = self._robot.link_names
+            if beats == 0 or not self._scene.still:
+                self._recorder.show_scene(tick.given.time, self._scene, elapsed)
             self._recorder.show(tick.given.time, law.cloud_W(), names, poses, arrow)
         if beat or tick.given.scans or self._recorder.ticks == "all":
             self._recorder.write(tick)

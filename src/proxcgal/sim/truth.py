@@ -6,19 +6,18 @@ proves it: between two postures a distance shrinks by no more than the two surfa
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from proxcgal import _core
-from proxcgal.sim import boxes
-from proxcgal.sim.surfaces import Surfaces, inverse
+from proxcgal.sim.frames import inverse, placed
+from proxcgal.sim.surfaces import Surfaces, moved
 
 if TYPE_CHECKING:
     from proxcgal.models.robots import Robot
-    from proxcgal.sim.scenario_keys import Obstacle
+    from proxcgal.sim.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -26,60 +25,105 @@ Array = NDArray[np.float64]
 AHEAD_M = 0.05
 
 
+class TrueDistances(NamedTuple):
+    """What is true at one moment; distances [m], inf where there is nothing."""
+
+    distance: float  #: least from a link that some joint moves to the scene
+    link: str = ""  #: that link
+    own: float = np.inf  #: between the robot's own links
+    obstacle: str = ""  #: the solid that is nearest
+    obstacle_W: Array | None = None  #: (3,) [m] its nearest point
+
+
+#: Where nobody wanted to know.
+NOT_ASKED = TrueDistances(np.nan, "", np.nan)
+
+
 class Truth:
     """How near one robot comes to the scene and to itself, tick after tick."""
 
-    def __init__(self, robot: Robot, obstacles: Sequence[Obstacle]) -> None:
+    def __init__(self, robot: Robot, scene: Scene) -> None:
         """Builds the scene's surfaces; the robot's are kept from trial to trial."""
         self._robot = robot
         self._surfaces = Surfaces.of(robot)
-        self._scene = _SceneDistance(self._surfaces, obstacles)
+        self._scene = _SceneDistance(self._surfaces, scene)
         self._own = _OwnDistance(self._surfaces)
 
-    def __call__(self, q: Array) -> tuple[float, str, float]:
-        """Distance to the scene, its link, distance between the robot's own links.
+    def __call__(self, q: Array, time: float = 0.0) -> TrueDistances:
+        """What is true at a posture, with the scene where it is at `time` [s].
 
-        Distances in metres, inf where there is nothing. The links that count against the scene are
-        those that some joint moves. The robot's own distance is asked anew whenever it could have
-        become the least of the run, no farther than 0.05 m beyond that, and is the last one asked
-        otherwise: its minimum over the run is exact.
+        The robot's own distance is asked anew whenever it could have become the least of the run,
+        no farther than 0.05 m beyond that, and is the last one asked otherwise: its minimum over
+        the run is exact.
         """
         poses_W = np.asarray(self._robot.link_poses(q))
-        distance, link = self._scene.at(poses_W)
-        name = self._robot.link_names[link] if link >= 0 else ""
-        return distance, name, self._own.at(poses_W)
+        found = self._scene.at(poses_W, time)
+        link = self._robot.link_names[found.link] if found.link >= 0 else ""
+        own = self._own.at(poses_W)
+        return TrueDistances(found.distance, link, own, found.solid, found.point_W)
+
+
+class _Nearest(NamedTuple):
+    distance: float = np.inf
+    link: int = -1
+    solid: str = ""
+    point_W: Array | None = None
 
 
 class _SceneDistance:
-    """Least distance from moving links to boxes that stand still, exact at every call."""
+    """Least distance from moving links to the scene's solids, exact at every call."""
 
-    def __init__(self, surfaces: Surfaces, obstacles: Sequence[Obstacle]) -> None:
+    def __init__(self, surfaces: Surfaces, scene: Scene) -> None:
         self._surfaces = surfaces
-        # A box in its own frame: there its faces are their own bounding boxes.
-        self._trees = [_core.MeshTree(*boxes.surface(box.size, np.eye(4))) for box in obstacles]
-        self._T_OW = [inverse(box.pose()) for box in obstacles]
-        rows = [(link, box) for box in range(len(obstacles)) for link in surfaces.moving]
+        self._scene = scene
+        # A solid in its own frame: there a box's faces are their own bounding boxes.
+        self._trees = [_core.MeshTree(*solid.core()) for solid in scene.solids]
+        self._T_WO, self._T_OW = np.empty((0, 4, 4)), np.empty((0, 4, 4))
+        rows = [(link, row) for row in range(len(self._trees)) for link in surfaces.moving]
         self._pairs = np.array(rows, np.intp).reshape(-1, 2)
         self._at_least = np.zeros(len(rows))
-        self._poses_W: Array | None = None
+        self._sweep: Array | None = None
 
-    def at(self, poses_W: Array) -> tuple[float, int]:
-        """Distance [m] and link; (inf, -1) without obstacles."""
-        links = self._pairs[:, 0]
-        if self._poses_W is not None:
-            self._at_least -= self._surfaces.motion(links, self._poses_W[links], poses_W[links])
-        self._poses_W = poses_W
-        best, nearest = np.inf, -1
+    def at(self, poses_W: Array, time: float) -> _Nearest:
+        """The nearest pair; without any, nothing at infinity."""
+        links, solids = self._pairs.T
+        if self._sweep is None or not self._scene.still:
+            self._T_WO = self._scene.poses(time)
+            self._T_OW = inverse(self._T_WO)
+        T_OL = self._T_OW[solids] @ poses_W[links]
+        sweep = self._surfaces.sweep(links, T_OL)
+        if self._sweep is not None:
+            self._at_least -= moved(self._sweep, sweep)
+        self._sweep = sweep
+        best = _Nearest()
         for row in np.argsort(self._at_least):
-            if self._at_least[row] >= best:
+            if self._at_least[row] >= best.distance:
                 break
-            link, box = self._pairs[row]
-            T_OL = self._T_OW[box] @ poses_W[link]
-            distance = self._trees[box].distance(self._surfaces.trees[link], T_OL, best)[0]
-            self._at_least[row] = min(distance, best)
-            if distance < best:
-                best, nearest = distance, int(link)
-        return best, nearest
+            link, solid = (int(index) for index in self._pairs[row])
+            distance, on_core_O, on_link_O = solid_distance(
+                self._trees[solid], self._scene.solids[solid].rounding,
+                self._surfaces.trees[link], T_OL[row], best.distance,
+            )  # fmt: skip
+            self._at_least[row] = min(distance, best.distance)
+            if distance < best.distance:
+                apart = on_link_O - on_core_O
+                far = max(float(np.linalg.norm(apart)), 1e-12)
+                on_solid_O = on_core_O + apart * min(self._scene.solids[solid].rounding / far, 1.0)
+                point_W = placed(self._T_WO[solid], on_solid_O)
+                best = _Nearest(distance, link, self._scene.names[solid], point_W)
+        return best
+
+
+def solid_distance(
+    core: _core.MeshTree, rounding: float, other: _core.MeshTree, T_OL: Array, bound: float
+) -> tuple[float, Array, Array]:
+    """From a solid's surface to a link, where that is under `bound`; inf otherwise [m].
+
+    Returns:
+        distance, 0 where they cross; the witnesses on core and link, in the solid's frame.
+    """
+    distance, on_core_O, on_link_L = core.distance(other, T_OL, bound + rounding)
+    return max(distance - rounding, 0.0), np.asarray(on_core_O), placed(T_OL, on_link_L)
 
 
 class _OwnDistance:

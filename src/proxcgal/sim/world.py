@@ -1,7 +1,7 @@
 """The simulated world: MuJoCo casts the sensors' rays and draws the pictures.
 
 The only module that knows MuJoCo. Nothing is stepped: the arm follows its velocity commands
-exactly, so a pose is set, and rays and pictures are taken at it.
+exactly and the scene its paths, so poses are set, and rays and pictures are taken at them.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxcgal.errors import SimulationError
+from proxcgal.sim.solids import Box, Capsule, Cylinder, Solid, Sphere
 
 
 def _off_screen_library() -> str:
@@ -40,7 +41,7 @@ import mujoco  # noqa: E402
 
 if TYPE_CHECKING:
     from proxcgal.models.robots import Robot
-    from proxcgal.sim.scenario_keys import Obstacle
+    from proxcgal.sim.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -49,6 +50,12 @@ Color = tuple[float, float, float, float]
 #: Group of what rays meet; the floor is drawn, never cast: it is not in any cloud.
 _CAST_GROUP = np.array([1, 0, 0, 0, 0, 0], np.uint8)
 _DRAWN_ONLY = 1
+_GEOMS: dict[type[Solid], Any] = {
+    Box: mujoco.mjtGeom.mjGEOM_BOX,
+    Cylinder: mujoco.mjtGeom.mjGEOM_CYLINDER,
+    Capsule: mujoco.mjtGeom.mjGEOM_CAPSULE,
+    Sphere: mujoco.mjtGeom.mjGEOM_SPHERE,
+}
 _LINK_COLORS = ((0.83, 0.84, 0.86, 1.0), (0.45, 0.62, 0.76, 1.0))
 _OBSTACLE_COLOR = (0.98, 0.72, 0.35, 0.4)
 
@@ -91,29 +98,33 @@ class Hits:
 
 
 class World:
-    """A robot's full-resolution links and the obstacles, at one posture at a time."""
+    """A robot's full-resolution links and a scene's solids, at one moment at a time."""
 
-    def __init__(self, robot: Robot, obstacles: Sequence[Obstacle] = ()) -> None:
-        """Builds the scene.
+    def __init__(self, robot: Robot, scene: Scene | None = None) -> None:
+        """Builds both.
 
         Args:
             robot: its `full_mesh` gives what rays meet, its `link_poses` where.
-            obstacles: boxes in the base frame.
+            scene: solids in the base frame; left out: none.
 
         Raises:
             SimulationError: MuJoCo refuses a mesh, with the link's name.
         """
         self._robot = robot
+        self._scene = scene
+        self._links = len(robot.link_names)
+        solids = () if scene is None else scene.solids
         self._warnings: list[str] = []
         mujoco.set_mju_user_warning(self._warnings.append)
-        self._model = copy.copy(_compiled(robot, len(obstacles)))
+        self._model = copy.copy(_compiled(robot, tuple(type(solid) for solid in solids)))
         self._data = mujoco.MjData(self._model)
-        self._put(obstacles)
+        self._shape(solids)
         self._renderers: dict[tuple[int, int], Any] = {}
+        self._place_scene(0.0)
         self.place(np.zeros(robot.n_q))
 
-    def place(self, q: Array) -> None:
-        """Puts every link where the robot's kinematics has it.
+    def place(self, q: Array, time: float = 0.0) -> None:
+        """Puts every link where the robot's kinematics has it, the scene where it is at `time`.
 
         Raises:
             SimulationError: `q` gives no finite pose, or MuJoCo warned.
@@ -121,9 +132,9 @@ class World:
         poses = self._robot.link_poses(q)
         if not np.isfinite(poses).all():
             raise SimulationError(f"the arm has no finite pose at q = {np.asarray(q).tolist()}")
-        for row, T_WL in enumerate(poses):
-            self._data.mocap_pos[row] = T_WL[:3, 3]
-            self._data.mocap_quat[row] = _quaternion(T_WL[:3, :3])
+        self._put(0, poses)
+        if self._scene is not None and not self._scene.still:
+            self._place_scene(time)
         mujoco.mj_kinematics(self._model, self._data)
         self._check()
 
@@ -157,7 +168,8 @@ class World:
         self._check()
         missed = geom < 0
         length[missed] = np.inf
-        return Hits(length, ~missed & (self._model.geom_bodyid[geom] > 0))  # 0: the scene
+        body = self._model.geom_bodyid[geom]  # 0 is the world, then come the links
+        return Hits(length, ~missed & (body <= self._links))
 
     def picture(
         self,
@@ -204,16 +216,25 @@ class World:
             told, self._warnings[:] = "; ".join(self._warnings), []
             raise SimulationError(f"MuJoCo warned: {told}")
 
-    def _put(self, obstacles: Sequence[Obstacle]) -> None:
-        """Gives the compiled boxes their sizes and places, and all that MuJoCo derives of them."""
+    def _shape(self, solids: Sequence[Solid]) -> None:
+        """Gives the compiled solids their sizes, and all that MuJoCo derives of them."""
         model = self._model
-        for geom, box in enumerate(obstacles):  # the first of all geoms
-            half = 0.5 * np.asarray(box.size)
-            model.geom_size[geom] = model.geom_aabb[geom, 3:] = half
-            model.geom_rbound[geom] = np.linalg.norm(half)
-            model.geom_pos[geom] = box.position
-            model.geom_quat[geom] = _quaternion(box.pose()[:3, :3])
+        for row, solid in enumerate(solids):
+            geom = int(model.body_geomadr[1 + self._links + row])
+            model.geom_size[geom] = _size(solid)
+            model.geom_aabb[geom, 3:] = solid.extent
+            model.geom_rbound[geom] = np.linalg.norm(solid.extent)
         mujoco.mj_setConst(model, self._data)
+
+    def _place_scene(self, time: float) -> None:
+        if self._scene is not None:
+            self._put(self._links, self._scene.poses(time))
+
+    def _put(self, first: int, poses: Array) -> None:
+        """Places bodies from that row on."""
+        for row, pose in enumerate(poses, first):
+            self._data.mocap_pos[row] = pose[:3, 3]
+            self._data.mocap_quat[row] = _quaternion(pose[:3, :3])
 
     def _renderer(self, size: tuple[int, int]) -> Any:
         if size not in self._renderers:
@@ -230,18 +251,29 @@ class World:
         return self._renderers[size]
 
 
-_models: WeakKeyDictionary[Robot, dict[int, Any]] = WeakKeyDictionary()
+_Shapes = tuple[type[Solid], ...]
+_models: WeakKeyDictionary[Robot, dict[_Shapes, Any]] = WeakKeyDictionary()
 
 
-def _compiled(robot: Robot, boxes: int) -> Any:
-    """The robot's links and that many boxes of no particular size; made once for each."""
+def _compiled(robot: Robot, shapes: _Shapes) -> Any:
+    """The robot's links and solids of no particular size; made once for each."""
     known = _models.setdefault(robot, {})
-    if boxes not in known:
-        known[boxes] = _compile(robot, boxes)
-    return known[boxes]
+    if shapes not in known:
+        known[shapes] = _compile(robot, shapes)
+    return known[shapes]
 
 
-def _compile(robot: Robot, boxes: int) -> Any:
+def _size(solid: Solid) -> tuple[float, ...]:
+    """As MuJoCo has it: three numbers, whatever the shape."""
+    if isinstance(solid, Box):
+        return tuple(solid.extent)
+    if isinstance(solid, Sphere):
+        return solid.radius, 0.0, 0.0
+    height = solid.height if isinstance(solid, Cylinder) else solid.length
+    return solid.radius, 0.5 * height, 0.0
+
+
+def _compile(robot: Robot, shapes: _Shapes) -> Any:
     spec = mujoco.MjSpec()
     spec.option.disableflags = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     for row, name in enumerate(robot.link_names):
@@ -254,9 +286,9 @@ def _compile(robot: Robot, boxes: int) -> Any:
             type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, contype=0, conaffinity=0,
             rgba=_LINK_COLORS[row % 2],
         )  # fmt: skip
-    for _ in range(boxes):
-        spec.worldbody.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_BOX, size=(0.5, 0.5, 0.5), contype=0, conaffinity=0,
+    for shape in shapes:
+        spec.worldbody.add_body(mocap=True).add_geom(
+            type=_GEOMS[shape], size=(0.5, 0.5, 0.5), contype=0, conaffinity=0,
             rgba=_OBSTACLE_COLOR,
         )  # fmt: skip
     _furnish(spec)

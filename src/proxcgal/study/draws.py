@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from proxcgal import _core
 from proxcgal.errors import ConfigError
 from proxcgal.models import Robot
-from proxcgal.sim import boxes
+from proxcgal.sim.frames import inverse, placed
 from proxcgal.sim.scenario import Scenario, change_scenario
-from proxcgal.sim.surfaces import Surfaces, inverse
+from proxcgal.sim.surfaces import Surfaces
 
 Array = NDArray[np.float64]
 
@@ -56,11 +56,12 @@ def draw_scene(base: Scenario, robot: Robot, seed: int, number: int) -> Draw:
     Raises:
         ConfigError: the base has no box or no offset, or hardly any draw would do.
     """
-    if len(base.obstacles) != 1 or base.goal.offset is None:
+    shapes = [box.shape if not box.path else f"moving {box.shape}" for box in base.obstacles]
+    if shapes != ["box"] or base.goal.offset is None:
         raise ConfigError(
-            f"scenario {base.name}: scenes can be drawn round one with exactly one obstacle and "
-            f"goal.offset; it has {len(base.obstacles)} obstacles and goal.offset = "
-            f"{base.goal.offset}"
+            f"scenario {base.name}: scenes can be drawn round one with exactly one obstacle, a box "
+            f"that stands still, and goal.offset; it has {', '.join(shapes) or 'no obstacle'} and "
+            f"goal.offset = {base.goal.offset}"
         )
     generator = np.random.default_rng([seed, zlib.crc32(base.name.encode()), number])
     redrawn: Counter[str] = Counter()
@@ -110,7 +111,8 @@ def _unfit(scenario: Scenario, robot: Robot) -> str | None:
         T_AB = inverse(poses_W[a]) @ poses_W[b]
         if surfaces.trees[a].distance(surfaces.trees[b], T_AB, OWN_CLEARANCE_M)[0] < np.inf:
             return "own links too near at the start"
-    plate = _core.MeshTree(*boxes.surface(panel.size, panel.pose()))
+    vertices_O, triangles = panel.solid().core()
+    plate = _core.MeshTree(placed(panel.pose(), vertices_O), triangles)
     for link in surfaces.moving:
         if plate.distance(surfaces.trees[link], poses_W[link], law.d_min + law.buffer)[0] < np.inf:
             return "panel too near at the start"

@@ -13,6 +13,7 @@ from PIL import Image, ImageDraw, ImageFont
 from proxcgal.sim.pictures import Snapshot, draw, snapshots, write_gif
 from proxcgal.sim.recording import Recording
 from proxcgal.sim.setup import Setup
+from proxcgal.sim.solids import Box
 from proxcgal.sim.world import Camera, World
 from proxcgal.study.figures import COLOURS, NAMES
 
@@ -44,7 +45,7 @@ def motion_picture(
     times = np.linspace(0.0, max(r.ticks[-1].given.time for r in recordings), FRAMES)
     seen = [snapshots(recording, times.tolist()) for recording in recordings]
     camera = camera_for(setup)
-    world = World(setup.robot, setup.scenario.obstacles)
+    world = World(setup.robot, setup.scene)
     frames = []
     try:
         for row, moment in enumerate(zip(*seen, strict=True)):
@@ -63,10 +64,10 @@ def motion_picture(
 
 def camera_for(setup: Setup) -> Camera:
     """A camera that has the arm and the first obstacle in view."""
-    if not setup.scenario.obstacles:
+    if not setup.scene.solids:
         return Camera()
     tool_W = np.asarray(setup.robot.tool_pose(setup.q0))[:3, 3]
-    middle = 0.5 * (tool_W + np.asarray(setup.scenario.obstacles[0].position))
+    middle = 0.5 * (tool_W + setup.scene.poses(0.0)[0][:3, 3])
     return Camera(
         lookat_W=(0.6 * float(middle[0]), 0.6 * float(middle[1]), 0.42),
         distance=1.95,
@@ -80,10 +81,11 @@ def bearing_for(setup: Setup) -> float:
 
     Along the first obstacle's face and a little from the arm's side, so that it hides nothing.
     """
-    box = setup.scenario.obstacles[0]
+    solid, T_WO = setup.scene.solids[0], setup.scene.poses(0.0)[0]
     tool_W = np.asarray(setup.robot.tool_pose(setup.q0))[:3, 3]
-    normal_W = np.asarray(box.pose())[:3, int(np.argmin(box.size))]
-    away = normal_W if (tool_W - np.asarray(box.position)) @ normal_W > 0.0 else -normal_W
+    to_tool_W = tool_W - T_WO[:3, 3]
+    normal_W = T_WO[:3, int(solid.extent.argmin())] if isinstance(solid, Box) else to_tool_W
+    away = normal_W if to_tool_W @ normal_W > 0.0 else -normal_W
     return float(np.arctan2(away[1], away[0]) + np.deg2rad(78.0))
 
 
