@@ -92,9 +92,13 @@ class TickHarness {
     std::string violation;
     if ((odd & 0x40) != 0) {
       change_points();
-      const Vector3 velocity_W = (odd & 0x84) == 0x80 ? any_vector() : Vector3(Vector3::Zero());
-      const TickOutput& out = controller_.tick_known(time, q_, points_, goal_, velocity_W);
-      const bool taken = points_.allFinite() && velocity_W.allFinite() &&
+      Points velocities_W(0, 3);
+      if ((odd & 0x84) == 0x80) {
+        velocities_W.resize(bytes_.one_in_eight() ? points_.rows() : 1, 3);
+        for (auto row : velocities_W.rowwise()) row = any_vector().transpose();
+      }
+      const TickOutput& out = controller_.tick_known(time, q_, points_, goal_, velocities_W);
+      const bool taken = points_.allFinite() && velocities_W.allFinite() &&
                          (points_.size() == 0 || points_.cwiseAbs().maxCoeff() <= 1e9);
       violation = checks_.after(q_, goal_, taken ? &points_ : nullptr, out);
       if (violation.empty() && checks_.blames_a_sensor())

@@ -101,6 +101,27 @@ Output tick(Controller& controller, double time, nb::handle q, const std::vector
   return kept(controller, controller.tick(time, joints, scans, T_WT, late, q_stamp));
 }
 
+/// `velocity_W` of `tick_known`: None, (3,) for all points, or (n, 3).
+class VelocityRows {
+ public:
+  VelocityRows(nb::handle value, Eigen::Index points) : rows_(nullptr, 0, 3) {
+    if (value.is_none()) return;
+    view_ = array_from(value, "velocity_W", "(3,) or (n, 3) float64", Take::kConvert);
+    if (view_.ndim() != 1) {
+      require_shape(view_, "velocity_W", "(3,), or (n, 3) with a row for each point", {points, 3});
+    } else {
+      require_shape(view_, "velocity_W", "(3,), or (n, 3) with a row for each point", {3});
+    }
+    const auto rows = static_cast<Eigen::Index>(view_.ndim() == 1 ? 1 : view_.shape(0));
+    new (&rows_) Eigen::Map<const Points>(view_.data(), rows, 3);
+  }
+  const Eigen::Map<const Points>& rows() const { return rows_; }
+
+ private:
+  ArrayView view_;
+  Eigen::Map<const Points> rows_;
+};
+
 Output tick_known(Controller& controller, double time, nb::handle q, nb::handle points,
                   nb::handle goal, nb::handle velocity) {
   const JointVector joints = vector_from(q, "q", controller.robot().n_q(), Take::kExact, false);
@@ -108,10 +129,9 @@ Output tick_known(Controller& controller, double time, nb::handle q, nb::handle 
   const ArrayView view =
       array_from(points, "points_W", "C-contiguous (n, 3) float64", Take::kExact);
   const auto points_W = points_view(view, "points_W");
-  const Vector3 velocity_W =
-      velocity.is_none() ? Vector3(Vector3::Zero()) : vector3_from(velocity, "velocity_W");
+  const VelocityRows velocities_W(velocity, points_W.rows());
   const nb::gil_scoped_release release;
-  return kept(controller, controller.tick_known(time, joints, points_W, T_WT, velocity_W));
+  return kept(controller, controller.tick_known(time, joints, points_W, T_WT, velocities_W.rows()));
 }
 
 Scan scan_from(int sensor, std::uint32_t counter, double stamp, nb::handle ranges,
@@ -258,10 +278,11 @@ void bind_controller(nanobind::module_& m) {
            "[s]; None: just now.\n\n"
            "Raises:\n    GeometryError: an array of the wrong shape or type. Bad values are "
            "findings, not errors.")
-      .def("tick_known", &tick_known, "time"_a, "q"_a, "points_W"_a, "goal"_a,
-           "velocity_W"_a = nb::none(),
-           "One cycle from points (n, 3) of the scene itself; `velocity_W` (3,) is the obstacle's "
-           "[m/s].")
+      .def(
+          "tick_known", &tick_known, "time"_a, "q"_a, "points_W"_a, "goal"_a,
+          "velocity_W"_a = nb::none(),
+          "One cycle from points (n, 3) of the scene itself; `velocity_W` is theirs [m/s]: (n, 3), "
+          "or (3,) for all.")
       .def("last_ticks", &last_ticks,
            "The last 64 ticks, the oldest first. After a STOP they stay as they were when it came, "
            "until `reset`.")

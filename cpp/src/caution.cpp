@@ -100,10 +100,9 @@ void Caution::watch(double time, const TickOutput& out, Perception& perception) 
   }
 }
 
-void Caution::keep_off(const Posture& posture, const Admissible& box, const Vector3& velocity_W,
-                       TickOutput& out) const {
+void Caution::keep_off(const Posture& posture, const Admissible& box, TickOutput& out) const {
   if (!whole_body_ || !inside(out)) return;
-  const JointVector row = opening_row(robot_, posture, control(out, velocity_W));
+  const JointVector row = opening_row(robot_, posture, control(out, Vector3::Zero()));
   keep_rate(row, 0.0, box, out.qd);
 }
 

@@ -34,8 +34,7 @@ class Caution {
   void watch(double time, const TickOutput& out, Perception& perception);
 
   /// Changes the command as little as possible so that the pair inside d_min does not come nearer.
-  void keep_off(const Posture& posture, const Admissible& box, const Vector3& velocity_W,
-                TickOutput& out) const;
+  void keep_off(const Posture& posture, const Admissible& box, TickOutput& out) const;
   /// Slows what moves into a silent sensor's view, and tells it where that has lasted.
   void slow_into_unseen(double time, const Posture& posture, const Perception& perception,
                         const Admissible& box, TickOutput& out, Monitor& monitor) const;

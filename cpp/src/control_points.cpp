@@ -160,7 +160,7 @@ ClosestPair ControlPoints::nearest_of(const Robot& robot, const Posture& posture
 
 std::span<const ControlPair> ControlPoints::sensor(const Skin& skin, const Posture& posture,
                                                    const PointsRef& cloud_W,
-                                                   const Vector3& velocity_W) {
+                                                   const Velocities& velocities) {
   chosen_.clear();
   ControlPair control;
   double nearest = kInfinity;
@@ -176,9 +176,9 @@ std::span<const ControlPair> ControlPoints::sensor(const Skin& skin, const Postu
       control.link = sensor_link_[s];
       control.control_W = mount_W;
       control.obstacle_W = point_W;
+      control.obstacle_velocity_W = velocities.of(static_cast<int>(i));
     }
   }
-  control.obstacle_velocity_W = velocity_W;
   control.distance = std::sqrt(nearest);
   if (control.link >= 0) chosen_.push_back(control);
   return chosen_;
@@ -186,7 +186,7 @@ std::span<const ControlPair> ControlPoints::sensor(const Skin& skin, const Postu
 
 std::span<const ControlPair> ControlPoints::links(const Robot& robot, const Posture& posture,
                                                   const PointsRef& cloud_W, int count,
-                                                  const Vector3& velocity_W, Monitor& monitor) {
+                                                  const Velocities& velocities, Monitor& monitor) {
   chosen_.clear();
   closest_pairs(robot, posture, cloud_W, links_, per_link_, &steps_);
   for (const ClosestPair& pair : per_link_) {
@@ -197,7 +197,7 @@ std::span<const ControlPair> ControlPoints::links(const Robot& robot, const Post
             [](const auto& x, const auto& y) { return x.distance < y.distance; });
   for (const ClosestPair& pair : sorted_) {
     if (static_cast<int>(chosen_.size()) == count || !pair.found()) break;
-    const ControlPair control = control_of(pair, velocity_W);
+    const ControlPair control = control_of(pair, velocities.of(pair.point));
     if (row_norm(robot, posture, control) >= min_row_norm_) chosen_.push_back(control);
   }
   return chosen_;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "proxcgal/controller.hpp"
+#include "velocities.hpp"
 
 namespace proxcgal::detail {
 
@@ -32,11 +33,11 @@ class ControlPoints {
                          double within);
   /// SM baseline ([WA] ref. 31): the sensor mounting point nearest to the cloud.
   std::span<const ControlPair> sensor(const Skin& skin, const Posture& posture,
-                                      const PointsRef& cloud_W, const Vector3& velocity_W);
+                                      const PointsRef& cloud_W, const Velocities& velocities);
   /// The `count` nearest links that joints can move away, one pair each, nearest first.
   std::span<const ControlPair> links(const Robot& robot, const Posture& posture,
-                                     const PointsRef& cloud_W, int count, const Vector3& velocity_W,
-                                     Monitor& monitor);
+                                     const PointsRef& cloud_W, int count,
+                                     const Velocities& velocities, Monitor& monitor);
   /// A pair that is known already.
   std::span<const ControlPair> one(const ControlPair& control);
 

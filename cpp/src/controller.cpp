@@ -11,6 +11,7 @@
 #include "proxcgal/error.hpp"
 #include "stopwatch.hpp"
 #include "tick_history.hpp"
+#include "velocities.hpp"
 
 namespace proxcgal {
 namespace {
@@ -89,28 +90,29 @@ struct Controller::Impl {
     return joints && rigid;
   }
 
-  void build(const Avoidance& spec, const PointsRef& cloud_W, const Vector3& velocity_W,
+  void build(const Avoidance& spec, const PointsRef& cloud_W, const detail::Velocities& velocities,
              BuiltTask& task) {
     std::span<const ControlPair> controls;
     if (config.control_point == ControlPoint::kSensor) {
-      controls = control_points.sensor(skin, posture, cloud_W, velocity_W);
+      controls = control_points.sensor(skin, posture, cloud_W, velocities);
     } else if (spec.nearest > 1) {
-      controls = control_points.links(*robot, posture, cloud_W, spec.nearest, velocity_W, monitor);
+      controls = control_points.links(*robot, posture, cloud_W, spec.nearest, velocities, monitor);
     } else if (out.pair) {
-      controls = control_points.one(caution.control(out, velocity_W));
+      controls = control_points.one(caution.control(out, velocities.of(out.pair->point)));
     }
     if (!controls.empty()) out.control = controls.front();
     build_avoidance(spec, *robot, posture, controls, task);
   }
 
-  void build_stack(const PointsRef& cloud_W, const Vector3& velocity_W, const Pose& goal) {
+  void build_stack(const PointsRef& cloud_W, const detail::Velocities& velocities,
+                   const Pose& goal) {
     for (std::size_t level = 0; level < config.tasks.size(); ++level) {
       BuiltTask& task = built[level];
       task.smallest_row_norm = kInfinity;
       std::visit(
           [&](const auto& spec) {
             using Spec = std::decay_t<decltype(spec)>;
-            if constexpr (std::is_same_v<Spec, Avoidance>) build(spec, cloud_W, velocity_W, task);
+            if constexpr (std::is_same_v<Spec, Avoidance>) build(spec, cloud_W, velocities, task);
             if constexpr (std::is_same_v<Spec, Reach>)
               build_reach(spec, *robot, posture, goal, task);
             if constexpr (std::is_same_v<Spec, JointLimits>)
@@ -181,8 +183,8 @@ struct Controller::Impl {
 
   /// From the joint state and a cloud to an admissible velocity.
   /// @param sensed  the cloud is the sensors', row by row; else it is known
-  void act(const JointVector& q, const PointsRef& cloud_W, bool sensed, const Vector3& velocity_W,
-           const Pose& goal) {
+  void act(const JointVector& q, const PointsRef& cloud_W, bool sensed,
+           const detail::Velocities& velocities, const Pose& goal) {
     detail::Stopwatch watch(config.timings);
     robot->update(q, posture);
     out.pair = control_points.nearest(clock.now(), *robot, posture, cloud_W, caution.d_min(),
@@ -192,7 +194,7 @@ struct Controller::Impl {
     } else {
       caution.trust_known(posture, out);
     }
-    build_stack(cloud_W, velocity_W, goal);
+    build_stack(cloud_W, velocities, goal);
     out.timings.distance_us = watch.lap_us();
     const std::span<const Task> tasks(stack.data(), config.tasks.size());
     solve(tasks, robot->n_q(), limits.qd_max, config.solver, solution);
@@ -203,7 +205,7 @@ struct Controller::Impl {
             box, out.qd);
     // What is known to be there has the last word over what may be where nothing is seen.
     if (sensed) caution.slow_into_unseen(clock.now(), posture, perception, box, out, monitor);
-    caution.keep_off(posture, box, velocity_W, out);
+    caution.keep_off(posture, box, out);
     out.timings.solve_us = watch.lap_us();
     judge();
     if ((q.array() < limits.q_min.array() || q.array() > limits.q_max.array()).any())
@@ -217,7 +219,7 @@ struct Controller::Impl {
       const JointVector& at = usable ? q : posture.q;  // the last posture that could be trusted
       const Admissible box = admissible(limits, at, qd_last, config.period, 1.0);
       decelerate(qd_last, box, out.qd);
-      if (usable) caution.keep_off(posture, box, Vector3::Zero(), out);
+      if (usable) caution.keep_off(posture, box, out);
     }
     qd_last = out.qd;
     if (usable) report();
@@ -255,7 +257,7 @@ const TickOutput& Controller::tick(double time, const JointVector& q, std::span<
     me.out.timings.sense_us = me.perception.sense_us;
     me.out.timings.filter_us = me.perception.filter_us;
     me.perception.freshness().check(me.clock.now(), me.monitor);
-    me.act(q, me.perception.cloud_W(), true, Vector3::Zero(), goal);
+    me.act(q, me.perception.cloud_W(), true, detail::Velocities(Points(0, 3)), goal);
     if (me.out.pair)
       me.out.pair_origin = me.perception.origins()[static_cast<std::size_t>(me.out.pair->point)];
     me.caution.watch(me.clock.now(), me.out, me.perception);
@@ -267,17 +269,19 @@ const TickOutput& Controller::tick(double time, const JointVector& q, std::span<
 
 const TickOutput& Controller::tick_known(double time, const JointVector& q,
                                          const PointsRef& points_W, const Pose& goal,
-                                         const Vector3& velocity_W) {
+                                         const PointsRef& velocities_W) {
   Impl& me = *impl_;
   detail::Stopwatch watch(me.config.timings);
   me.begin(time, false);
   bool usable = me.usable(time, q, std::nullopt, goal);
-  if (points_W.rows() > me.config.max_points || !points_W.allFinite() || !velocity_W.allFinite() ||
+  const Eigen::Index rows = velocities_W.rows();
+  if (points_W.rows() > me.config.max_points || !points_W.allFinite() ||
+      (rows > 1 && rows != points_W.rows()) || !velocities_W.allFinite() ||
       (points_W.size() > 0 && points_W.cwiseAbs().maxCoeff() > kFarthest)) {
     me.note(Reason::kPointsInvalid);
     usable = false;
   }
-  if (usable) me.act(q, points_W, false, velocity_W, goal);
+  if (usable) me.act(q, points_W, false, detail::Velocities(velocities_W), goal);
   me.conclude(q, usable);
   me.out.timings.total_us = watch.lap_us();
   return me.out;

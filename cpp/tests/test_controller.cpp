@@ -120,6 +120,34 @@ TEST(Controller, KnownPointsAllocateNothing) {
   EXPECT_EQ(counter.count(), 0U);
 }
 
+TEST(Controller, EveryKnownPointHasItsOwnVelocity) {
+  const auto robot = test::arm();
+  Posture posture = robot->make_posture();
+  robot->update(bent(), posture);
+  Points points(2, 3), velocities_W(2, 3);
+  points.row(0) = (posture.T_WT.translation() + Vector3(0.25, 0, 0)).transpose();
+  points.row(1) << 3.0, 3.0, 3.0;
+  velocities_W << -0.1, 0.02, 0.03, 0.7, 0.8, 0.9;
+  for (const int nearest : {1, 2}) {
+    for (const ControlPoint point : {ControlPoint::kWholeBody, ControlPoint::kSensor}) {
+      const ControllerConfig config{.control_point = point,
+                                    .tasks = {Avoidance{.nearest = nearest}, Reach{}}};
+      Controller controller(robot, test::ring(), config);
+      const TickOutput& out =
+          controller.tick_known(0.0, bent(), points, posture.T_WT, velocities_W);
+      ASSERT_TRUE(out.pair);
+      EXPECT_EQ(out.control.obstacle_velocity_W, Vector3(velocities_W.row(out.pair->point)));
+      EXPECT_EQ(out.pair->point, 0);
+      const TickOutput& alike =
+          controller.tick_known(0.01, bent(), points, posture.T_WT, velocities_W.row(1));
+      EXPECT_EQ(alike.control.obstacle_velocity_W, Vector3(velocities_W.row(1)));
+      controller.tick_known(0.02, bent(), points, posture.T_WT, Points::Zero(3, 3));
+      ASSERT_FALSE(controller.findings().empty());
+      EXPECT_EQ(controller.findings().front().reason, Reason::kPointsInvalid);
+    }
+  }
+}
+
 TEST(Controller, CommandsStayWithinLimits) {
   const auto robot = test::arm();
   Controller controller(robot, test::ring(), five_tasks());

@@ -79,7 +79,7 @@ struct TickOutput {
   /// [m] what of the pair's distance is still to be trusted: less the way that something may have
   /// come since the scan was fresh, negative where the obstacle is inside the surface.
   double trusted_distance = kInfinity;
-  ControlPair control;  ///< what the first avoidance row acts on
+  ControlPair control;  ///< what the first avoidance row acts on, with its obstacle's velocity
   Mode mode = Mode::kRun;
   int n_tasks = 0;
   std::array<TaskReport, kMaxLevels> tasks;
@@ -125,10 +125,11 @@ class Controller {
                          const Pose& goal, bool late = false,
                          std::optional<double> q_stamp = std::nullopt);
   /// The scene itself instead of scans.
-  /// @param points_W    (n, 3), n <= max_points
-  /// @param velocity_W  of the obstacle, zero where it is not known [m/s]
+  /// @param points_W      (n, 3), n <= max_points
+  /// @param velocities_W  of the obstacles [m/s]: a row for each point, one for all, or none where
+  ///                      they are not known
   const TickOutput& tick_known(double time, const JointVector& q, const PointsRef& points_W,
-                               const Pose& goal, const Vector3& velocity_W = Vector3::Zero());
+                               const Pose& goal, const PointsRef& velocities_W = Points(0, 3));
 
   /// @name State of the last tick
   /// @{
