@@ -20,6 +20,7 @@ CPP_LAYER_OF = {
     "require": "base",
     "stopwatch": "base",
     "frames": "base",
+    "velocities": "base",
     "geometry": "geometry",
     "robot": "robot",
     "pipeline": "stages",

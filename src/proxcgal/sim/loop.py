@@ -39,9 +39,10 @@ def run_ticks(
         scans = list(given.scans)
         elapsed = tick * law.config.period
         points_W = cloud(elapsed if given.known else 0.0)
+        velocity_W = None if cloud.still else cloud.velocities(elapsed)
         start = clock.perf_counter_ns()
         if given.known:
-            out = law.tick_known(given.time, given.q, points_W, given.goal)
+            out = law.tick_known(given.time, given.q, points_W, given.goal, velocity_W)
         else:
             out = law.tick(given.time, given.q, scans, given.goal, given.late, given.q_stamp)
         tick_us = (clock.perf_counter_ns() - start) / 1000.0
