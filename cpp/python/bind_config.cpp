@@ -55,11 +55,11 @@ void bind_config(nanobind::module_& m) {
           [](MonitorConfig* self, double degraded_after, double hold_after, double degraded_scale,
              int clean_cycles, int missed_deadlines, int suspect_repeats, double fresh_within,
              double approach_speed, double blind_speed, double joints_hold_after,
-             double joints_stop_after, double stuck_after) {
-            const MonitorConfig config{degraded_after,    hold_after,        degraded_scale,
-                                       clean_cycles,      missed_deadlines,  suspect_repeats,
-                                       fresh_within,      approach_speed,    blind_speed,
-                                       joints_hold_after, joints_stop_after, stuck_after};
+             double joints_stop_after, double stuck_after, bool await_mounts) {
+            const MonitorConfig config{
+                degraded_after,    hold_after,   degraded_scale, clean_cycles, missed_deadlines,
+                suspect_repeats,   fresh_within, approach_speed, blind_speed,  joints_hold_after,
+                joints_stop_after, stuck_after,  await_mounts};
             config.validate();
             new (self) MonitorConfig(config);
           },
@@ -74,7 +74,8 @@ void bind_config(nanobind::module_& m) {
           "blind_speed"_a = MonitorConfig{}.blind_speed,
           "joints_hold_after"_a = MonitorConfig{}.joints_hold_after,
           "joints_stop_after"_a = MonitorConfig{}.joints_stop_after,
-          "stuck_after"_a = MonitorConfig{}.stuck_after)
+          "stuck_after"_a = MonitorConfig{}.stuck_after,
+          "await_mounts"_a = MonitorConfig{}.await_mounts)
       .def_ro("degraded_after", &MonitorConfig::degraded_after,
               "[s] age at which one silent sensor degrades the mode.")
       .def_ro("hold_after", &MonitorConfig::hold_after,
@@ -97,7 +98,9 @@ void bind_config(nanobind::module_& m) {
       .def_ro("joints_stop_after", &MonitorConfig::joints_stop_after,
               "[s] age of the joint state that stops it.")
       .def_ro("stuck_after", &MonitorConfig::stuck_after,
-              "[s] of avoidance not executed inside d_min, before HOLD.");
+              "[s] of avoidance not executed inside d_min, before HOLD.")
+      .def_ro("await_mounts", &MonitorConfig::await_mounts,
+              "HOLD until Controller.accept_mounts() says that the mounts were checked.");
   nb::class_<ControllerConfig>(
       m, "ControllerConfig",
       "Everything the controller is set up with; `tasks` in order of priority.")

@@ -305,6 +305,8 @@ void bind_controller(nanobind::module_& m) {
           "(n, 3) before body removal, in world [m].")
       .def("scan_ages", &Controller::scan_ages, "time"_a,
            "[s] since each sensor's last scan was received, inf where none came.")
+      .def("accept_mounts", &Controller::accept_mounts,
+           "The mounts were checked: ends the HOLD that monitor.await_mounts begins with.")
       .def("reset", &Controller::reset,
            "Leaves STOP, only once its cause is gone; True where it did.")
       .def_prop_ro(

@@ -49,6 +49,15 @@ Eigen::VectorXd first_hit(const MeshTree& tree, nb::handle origins, nb::handle d
   return length;
 }
 
+Eigen::VectorXd winding_number(const MeshTree& tree, nb::handle points) {
+  const PointsArgument points_L(points, "points_L");
+  Eigen::VectorXd out(points_L().rows());
+  const nb::gil_scoped_release release;
+  for (Eigen::Index i = 0; i < out.size(); ++i)
+    out[i] = tree.winding_number(points_L().row(i).transpose());
+  return out;
+}
+
 auto distance(const MeshTree& tree, const MeshTree& other, nb::handle T_LO, double bound) {
   Vector3 here = Vector3::Constant(std::nan("")), there = here;
   const Pose pose = pose_from(T_LO, "T_LO");
@@ -92,6 +101,9 @@ void bind_geometry(nanobind::module_& m) {
       .def("first_hit", &first_hit, "origins_L"_a, "directions_L"_a,
            "Length (n,) [m] of each ray up to its first hit, inf where nothing is hit. Directions "
            "(n, 3) need not be unit.")
+      .def("winding_number", &winding_number, "points_L"_a,
+           "(n,) how often the surface goes round each of the (n, 3) points: 1 or -1 inside a "
+           "closed one, 0 outside, in between where it is open.")
       .def("distance", &distance, "other"_a, "T_LO"_a, "bound"_a = kInfinity,
            "Exact distance to another surface whose frame has pose T_LO (4, 4) in this one's: "
            "(distance [m], point on this in L,\n"

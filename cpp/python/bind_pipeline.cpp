@@ -82,6 +82,29 @@ std::vector<NamedPair> closest_pairs_all(const Robot& robot, nb::handle q, nb::h
   return out;
 }
 
+/// Row by row; the links by name.
+struct SignedDistances {
+  Eigen::VectorXd distance;
+  std::vector<std::string> link;
+  Points surface_W, normal_W;
+};
+
+SignedDistances signed_distances(const Robot& robot, nb::handle q, nb::handle points) {
+  const PointsArgument points_W(points, "points_W");
+  const Posture posture = posture_at(robot, q);
+  const Eigen::Index n = points_W().rows();
+  SignedDistances out{Eigen::VectorXd(n), {}, Points(n, 3), Points(n, 3)};
+  const nb::gil_scoped_release release;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const SignedDistance found = signed_distance(robot, posture, points_W().row(i).transpose());
+    out.distance[i] = found.distance;
+    out.link.push_back(robot.spec().links[static_cast<std::size_t>(found.link)].name);
+    out.surface_W.row(i) = found.surface_W.transpose();
+    out.normal_W.row(i) = found.normal_W.transpose();
+  }
+  return out;
+}
+
 /// Robot links against a surface that is not the robot's: the exact distance of meshes.
 NamedPair mesh_distance(const Robot& robot, nb::handle q, const MeshTree& tree, nb::handle T_WO,
                         const std::optional<std::vector<std::string>>& links, double bound) {
@@ -292,6 +315,24 @@ void bind_pipeline(nanobind::module_& m) {
         "Raises:\n    GeometryError: empty cloud, wrong shape, or not finite.");
   m.def("closest_pairs", &closest_pairs_all, "robot"_a, "q"_a, "points_W"_a,
         "The nearest pair of each link, in the order of link_names.");
+  nb::class_<SignedDistances>(m, "SignedDistances",
+                              "Distances with a sign, row by row of the points asked for.")
+      .def_ro("distance", &SignedDistances::distance, "(n,) [m], negative inside a link.")
+      .def_ro("link", &SignedDistances::link,
+              "n names: the nearest link; inside, the one in which the point is deepest.")
+      .def_ro("surface_W", &SignedDistances::surface_W, "(n, 3) nearest point of that link [m].")
+      .def_ro("normal_W", &SignedDistances::normal_W,
+              "(n, 3) unit, out of the link at `surface_W`: the way that leads out.");
+  m.def("signed_distance", &signed_distances, "robot"_a, "q"_a, "points_W"_a,
+        "Distance to the arm with its sign, and the way out, for each of the (n, 3) points.\n\n"
+        "Inside is where a link's surface goes round the point more than half, by the generalized "
+        "winding number:\ndrawn meshes are open at their flanges, and parts of theirs overlap. "
+        "The distance is to the nearest surface\nthat is drawn, inner walls too. Asks every "
+        "triangle of the links round a point: not for a control loop.\n\n"
+        "Args:\n    q: (n_q,).\n    points_W: (n, 3) [m].\n\n"
+        "Returns:\n    SignedDistances: distance, link, surface_W, normal_W.\n\n"
+        "Raises:\n    GeometryError: wrong shape, or not finite.\n\n"
+        "Source: Jacobson, Kavan & Sorkine-Hornung, SIGGRAPH 2013, for the sign.");
   m.def("mesh_distance", &mesh_distance, "robot"_a, "q"_a, "tree"_a, "T_WO"_a = nb::none(),
         "links"_a = nb::none(), "bound"_a = kInfinity,
         "Exact distance from the robot's meshes to another surface whose frame has pose T_WO in "

@@ -41,6 +41,7 @@ struct Controller::Impl {
 
   detail::TickHistory history;
   double stuck_since = -1.0;  // [s] internal, negative while avoidance is executed
+  bool mounts_accepted;
 
   JointVector qd_last;
   Posture posture;
@@ -59,6 +60,7 @@ struct Controller::Impl {
         caution(*robot, skin, config),
         limits{robot->q_min(), robot->q_max(), robot->qd_max(), robot->qdd_max()},
         clock(config.period),
+        mounts_accepted(!config.monitor.await_mounts),
         posture(robot->make_posture()) {
     for (const TaskSpec& task : config.tasks) proxcgal::validate(task, *robot);
     if (!limits.qd_max.allFinite() || !limits.qdd_max.allFinite()) {
@@ -251,6 +253,7 @@ const TickOutput& Controller::tick(double time, const JointVector& q, std::span<
   Impl& me = *impl_;
   detail::Stopwatch watch(me.config.timings);
   me.begin(time, late);
+  if (!me.mounts_accepted) me.note(Reason::kMountsUnchecked);
   const bool usable = me.usable(time, q, q_stamp, goal);
   if (usable) {
     me.perception.update(me.clock.now(), me.clock.delay(), q, scans, me.monitor);
@@ -303,6 +306,7 @@ const Robot& Controller::robot() const { return *impl_->robot; }
 const Skin& Controller::skin() const { return impl_->skin; }
 const ControllerConfig& Controller::config() const { return impl_->config; }
 std::vector<TickRecord> Controller::last_ticks() const { return impl_->history.records(); }
+void Controller::accept_mounts() { impl_->mounts_accepted = true; }
 bool Controller::reset() {
   const bool left = impl_->monitor.reset();
   if (left) impl_->history.go_on();

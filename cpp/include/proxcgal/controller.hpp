@@ -149,6 +149,9 @@ class Controller {
   const ControllerConfig& config() const;
   /// Leaves STOP, only once its cause is gone; true where it did.
   bool reset();
+  /// The sensors sit where the skin says: ends the HOLD of `monitor.await_mounts`. For whoever has
+  /// compared what they see of the arm itself with what they must see.
+  void accept_mounts();
 
  private:
   struct Impl;

@@ -99,6 +99,7 @@ enum class Reason : std::uint8_t {
   kDeadlinesMissed,     ///< too many in a row
   kWorkBounded,         ///< a search or the filter was cut short: a lower bound, points kept
   kPointsInvalid,       ///< known points or their velocity not finite, or too many
+  kMountsUnchecked,     ///< nobody has said yet that the sensors sit where they are said to
 };
 
 /// One thing the monitor found in this tick.

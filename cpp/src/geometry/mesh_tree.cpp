@@ -180,6 +180,21 @@ bool MeshTree::inside(const Vector3& point_L) const {
   return odd >= 2;
 }
 
+double MeshTree::winding_number(const Vector3& point_L) const {
+  // The sum of the triangles' solid angles (Van Oosterom & Strackee 1983) over the full 4 pi.
+  double half_angles = 0.0;
+  const auto at = [&](Eigen::Index f, int k) {
+    return Vector3(impl_->vertices.row(impl_->triangles(f, k)).transpose() - point_L);
+  };
+  for (Eigen::Index f = 0; f < impl_->triangles.rows(); ++f) {
+    const Vector3 a = at(f, 0), b = at(f, 1), c = at(f, 2);
+    const double la = a.norm(), lb = b.norm(), lc = c.norm();
+    half_angles +=
+        std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
+  }
+  return half_angles / (2.0 * std::acos(-1.0));
+}
+
 double MeshTree::distance(const MeshTree& other, const Pose& T_LO, double bound, Vector3* on_this_L,
                           Vector3* on_other_L) const {
   const double squared_bound = bound * bound;

@@ -212,4 +212,39 @@ void closest_pairs(const Robot& robot, const Posture& posture, const PointsRef& 
   });
 }
 
+SignedDistance signed_distance(const Robot& robot, const Posture& posture, const Vector3& point_W) {
+  constexpr double kAround = 0.5;     // of once round
+  constexpr double kTouching = 1e-9;  // [m] nearer than this the direction to the surface is noise
+  constexpr double kStep = 1e-6;      // [m] off the surface, to see which side is out
+  SignedDistance best;
+  for (int link = 0; link < robot.n_links(); ++link) {
+    const MeshTree& tree = robot.tree(link);
+    const Pose& T_WL = posture.T_WL[static_cast<std::size_t>(link)];
+    const Vector3 point_L = detail::into(T_WL, point_W);
+    const Bounds& box = tree.bounds();
+    const bool within =
+        (point_L.array() >= box.low.array() && point_L.array() <= box.high.array()).all();
+    const bool inside = within && std::abs(tree.winding_number(point_L)) > kAround;
+    if (!inside && best.distance <= 0.0) continue;
+    const auto found = tree.nearest(point_L, inside ? kInfinity : best.distance * best.distance);
+    if (!found) continue;
+    const double length = std::sqrt(found->squared_distance);
+    const double distance = inside ? -length : length;
+    if (!(distance < best.distance)) continue;
+    Vector3 normal_L = (point_L - found->point_L) / (inside ? -length : length);
+    if (length < kTouching) {
+      // On the surface: its own normal there, towards where it goes round less.
+      const auto corner = [&](int k) {
+        return Vector3(tree.vertices_L().row(tree.triangles()(found->triangle, k)).transpose());
+      };
+      normal_L = (corner(1) - corner(0)).cross(corner(2) - corner(0)).normalized();
+      const double ahead = std::abs(tree.winding_number(found->point_L + kStep * normal_L));
+      const double behind = std::abs(tree.winding_number(found->point_L - kStep * normal_L));
+      if (ahead > behind) normal_L = -normal_L;
+    }
+    best = {distance, link, T_WL * found->point_L, T_WL.linear() * normal_L};
+  }
+  return best;
+}
+
 }  // namespace proxcgal

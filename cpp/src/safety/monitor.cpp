@@ -37,6 +37,7 @@ Mode mode_of(Reason reason) {
     case Reason::kNoControllableLink:
     case Reason::kGoalInvalid:
     case Reason::kDeadlinesMissed:
+    case Reason::kMountsUnchecked:
       return Mode::kHold;
     case Reason::kSensorSilent:
     case Reason::kSensorSuspect:
@@ -105,6 +106,8 @@ const char* reason_name(Reason reason) {
       return "work_bounded";
     case Reason::kPointsInvalid:
       return "points_invalid";
+    case Reason::kMountsUnchecked:
+      return "mounts_unchecked";
   }
   return "unknown";
 }

@@ -72,6 +72,11 @@ class MeshTree {
   /// decide: drawn meshes are open here and there.
   bool inside(const Vector3& point_L) const;
 
+  /// How often the surface goes round the point: 1 or -1 inside a closed one, 0 outside, in between
+  /// where it is open (Jacobson, Kavan & Sorkine-Hornung, Robust Inside-Outside Segmentation using
+  /// Generalized Winding Numbers, SIGGRAPH 2013). Asks every triangle: for set-up and evaluation.
+  double winding_number(const Vector3& point_L) const;
+
   /// Distance between two surfaces, 0 where they cross.
   /// @param T_LO   pose of the other link's frame in this one
   /// @param bound  only surface nearer than this counts; infinity is returned past it [m]

@@ -27,4 +27,17 @@ void closest_pairs(const Robot& robot, const Posture& posture, const PointsRef& 
                    std::span<const int> links, std::span<ClosestPair> pairs,
                    std::int64_t* steps = nullptr);
 
+/// How far a point is from the arm, and which way is out.
+struct SignedDistance {
+  double distance = kInfinity;  ///< [m] negative inside a link
+  int link = -1;                ///< the nearest; inside, that in which the point is deepest
+  Vector3 surface_W = Vector3::Zero();
+  Vector3 normal_W = Vector3::Zero();  ///< unit, out of the link at `surface_W`
+};
+
+/// Distance to the union of all links, with its sign. Inside is where a link's surface goes round
+/// the point more than half (`MeshTree::winding_number`). Asks every triangle of a link whose box
+/// holds the point: not for the tick.
+SignedDistance signed_distance(const Robot& robot, const Posture& posture, const Vector3& point_W);
+
 }  // namespace proxcgal

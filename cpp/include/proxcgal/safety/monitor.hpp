@@ -20,6 +20,7 @@ struct MonitorConfig {
   double joints_hold_after = 0.02;  ///< [s] age of the joint state that holds the arm
   double joints_stop_after = 0.10;  ///< [s] age of the joint state that stops it
   double stuck_after = 0.1;         ///< [s] of avoidance not executed inside d_min, before HOLD
+  bool await_mounts = false;        ///< HOLD until `Controller::accept_mounts`
   void validate() const;
 };
 
