@@ -92,7 +92,11 @@ ControlPair Caution::control(const TickOutput& out, const Vector3& velocity_W) c
 }
 
 void Caution::watch(double time, const TickOutput& out, Perception& perception) {
-  if (!inside(out)) near_since_ = time;
+  // A payload that is stuck is no obstacle that was seen there: it must not outlive its fault.
+  const bool doubtful =
+      out.pair && out.pair_origin.sensor >= 0 &&
+      perception.freshness().suspect(static_cast<std::size_t>(out.pair_origin.sensor));
+  if (!inside(out) || doubtful) near_since_ = time;
   if (time - near_since_ > kBelieved) {
     perception.watch({out.pair_origin, out.pair->obstacle_W});
   } else {

@@ -24,6 +24,8 @@ class Freshness {
   double age(std::size_t sensor, double time) const;  ///< [s] since the last usable packet
   /// [s] since the sensor last told anything that can be believed.
   double blind_for(std::size_t sensor, double time) const;
+  /// The same payload again and again: it is not what the sensor sees.
+  bool suspect(std::size_t sensor) const { return suspect(packets_[sensor]); }
   std::size_t sensors() const { return packets_.size(); }
 
  private:

@@ -25,6 +25,7 @@ from proxcgal._core import (
     Reach,
     Scan,
     SensorModel,
+    SignedDistances,
     Skin,
     Solution,
     SolverConfig,
@@ -36,6 +37,7 @@ from proxcgal._core import (
     mesh_distance,
     remove_body,
     self_distances,
+    signed_distance,
     solve,
     zone_directions,
 )
@@ -48,7 +50,16 @@ from proxcgal.errors import (
     RecordingError,
     SimulationError,
 )
-from proxcgal.models import Robot, attach, attach_mesh, load_robot, ring_skin
+from proxcgal.models import (
+    MountCheck,
+    MountChecks,
+    Robot,
+    attach,
+    attach_mesh,
+    check_mounts,
+    load_robot,
+    ring_skin,
+)
 
 __version__ = _version("proxcgal")
 
@@ -72,12 +83,15 @@ __all__ = [
     "ModelWarning",
     "MonitorConfig",
     "Mount",
+    "MountCheck",
+    "MountChecks",
     "ProxError",
     "Reach",
     "RecordingError",
     "Robot",
     "Scan",
     "SensorModel",
+    "SignedDistances",
     "SimulationError",
     "Skin",
     "Solution",
@@ -87,6 +101,7 @@ __all__ = [
     "TickOutput",
     "attach",
     "attach_mesh",
+    "check_mounts",
     "closest_pair",
     "closest_pairs",
     "load_robot",
@@ -94,6 +109,7 @@ __all__ = [
     "remove_body",
     "ring_skin",
     "self_distances",
+    "signed_distance",
     "solve",
     "zone_directions",
 ]

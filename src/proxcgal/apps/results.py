@@ -113,16 +113,28 @@ def check(
         quiet: no word on stderr.
 
     Raises:
-        ProxError: what of the scenario, the robot or the sensors cannot be.
+        ProxError: what of the scenario, the robot or the sensors cannot be; sensors that do not
+            sit where the scenario says.
     """
     from proxcgal.sim.faults import FaultInjector
+    from proxcgal.sim.mounting import require_mounts
     from proxcgal.sim.setup import Setup
+    from proxcgal.sim.source import SimulatedSource
+    from proxcgal.sim.world import World
 
     announce(f"setting up {scenario.name} (a robot's first time takes a while)", quiet=quiet)
     setup = Setup.of(scenario, robot)
     for controller in controllers:
         setup.make_controller(controller)
     FaultInjector(scenario.faults, [mount.name for mount in setup.skin.mounts], scenario.seed)
+    if scenario.skin.check_mounts and not all(map(setup.uses_known_points, controllers)):
+        source = SimulatedSource(setup, World(setup.robot, setup.scene), scenario.seed)
+        checks = require_mounts(setup, source)
+        announce(
+            f"{scenario.name}: {checks.judged} of {len(checks.sensors)} sensors see enough of the "
+            "arm itself for their mounts to be judged; none is wrong",
+            quiet=quiet,
+        )
 
 
 def combine(folder: Path, summaries: Sequence[Summary], origin: dict[str, Any]) -> None:

@@ -2,15 +2,19 @@
 
 from proxcgal.models.assembly import attach, attach_mesh
 from proxcgal.models.description import RobotDescription
+from proxcgal.models.mounts import MountCheck, MountChecks, check_mounts
 from proxcgal.models.read import read_description
 from proxcgal.models.robots import Robot, list_robots, load_robot
 from proxcgal.models.skins import ring_skin
 
 __all__ = [
+    "MountCheck",
+    "MountChecks",
     "Robot",
     "RobotDescription",
     "attach",
     "attach_mesh",
+    "check_mounts",
     "list_robots",
     "load_robot",
     "read_description",

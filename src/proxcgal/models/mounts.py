@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2, norm
 
 from proxcgal import _core
 from proxcgal.errors import ConfigError
@@ -25,14 +24,14 @@ _SURFACE = 0.001  # [m] standard deviation of model, rounding and rays against t
 _SHARE = 0.25  # [-] of a step's change, by which both ways may differ: else an edge is near
 _KINK = 0.001  # [m] the same, at least
 _GATE = 0.06  # [m] what measures farther from the prediction is another thing
-_FALSE_ALARM = 1e-6  # of one sensor whose mount is right
-_MISSED = 1e-3  # of an error that counts as visible
+# Of the score, chi squared with 6 degrees of freedom: passed once in 10^6 by a right mount.
+THRESHOLD = 38.2583
+_SURE = 3.0902  # sigmas that miss one error in 1000 that counts as visible
 _MIN_SCANS = 3  # that must tell of a zone
 _MIN_ZONES = 4  # less is no view
 _MIN_GAPS = 4  # zones that look through where the body must be
 _ROUNDS = 3  # of the fit, so that its size is that of the error
 _CLEAR = 4.0  # sigmas of one range
-_THRESHOLD = float(chi2.isf(_FALSE_ALARM, 6))  # of the score: a shift and a turn are fitted
 _AXES = ("x", "y", "z", "turn x", "turn y", "turn z")
 
 
@@ -51,6 +50,7 @@ class MountCheck:
     turn: float  #: [rad] the same
 
     def __str__(self) -> str:
+        """One line: which sensor, how far off."""
         size = f"{1000 * self.shift:.1f} mm and {np.rad2deg(self.turn):.1f} deg"
         return f"sensor {self.sensor} ({self.name}): off by about {size}, by {self.zones} zones"
 
@@ -72,6 +72,7 @@ class MountChecks:
         return sum(bool(check.visible) for check in self.sensors)
 
     def __bool__(self) -> bool:
+        """True where none was found wrong."""
         return not self.wrong
 
 
@@ -94,7 +95,7 @@ def check_mounts(
         robot: see `load_robot`.
         skin: the sensors where they are taken to be.
         q: (n_q,) where the arm stood still meanwhile.
-        scans: of any sensors, in any order; at least 3 of each; 30 tell 5 mm and 2 degrees where they can.
+        scans: of any sensors, in any order, at least 3 of each; 30 tell 5 mm and 2 degrees.
 
     Returns:
         One check per sensor; true where none is wrong.
@@ -114,7 +115,11 @@ def check_mounts(
                 f"{', '.join(robot.link_names)}"
             )
         T_WS = body.poses_W[robot.link_names.index(mount.link)] @ np.asarray(mount.T_LS)
-        checks.append(_check(row, mount.name, _View(body, skin.model, T_WS), skin.model, ranges[row], sigma[row]))
+        checks.append(
+            _check(
+                row, mount.name, _View(body, skin.model, T_WS), skin.model, ranges[row], sigma[row]
+            )
+        )
     return MountChecks(sensors=tuple(checks))
 
 
@@ -142,7 +147,9 @@ class _Body:
     def __init__(self, robot: Robot, poses_W: Floats) -> None:
         self.poses_W = poses_W
         self._trees = _trees(robot)
-        boxes = [(np.asarray(t.vertices_L).min(0), np.asarray(t.vertices_L).max(0)) for t in self._trees]
+        boxes = [
+            (np.asarray(t.vertices_L).min(0), np.asarray(t.vertices_L).max(0)) for t in self._trees
+        ]
         self._centres = np.array([(low + high) / 2 for low, high in boxes])
         self._radii = np.array([np.linalg.norm(high - low) / 2 for low, high in boxes])
 
@@ -189,23 +196,24 @@ class _View:
 
     def __call__(self, moved: Floats, zones: NDArray[np.intp]) -> Floats:
         """Ranges (k, len(zones)) from mounts moved by (k, 6): shift [m], turn [rad], in S."""
-        turns = np.array([_rotation(turn) for turn in moved[:, 3:]])
+        turns = np.array([rotation_by(turn) for turn in moved[:, 3:]])
         R_WS = self._T_WS[:3, :3] @ turns
         origins = self._T_WS[:3, 3] + moved[:, :3] @ self._T_WS[:3, :3].T
         rays = self._rays_S[zones] @ np.swapaxes(R_WS, 1, 2)
         starts = np.broadcast_to(origins[:, None, :], rays.shape)
-        found = self._body.cast(starts.reshape(-1, 3), rays.reshape(-1, 3))
+        found: Floats = self._body.cast(starts.reshape(-1, 3), rays.reshape(-1, 3))
         return found.reshape(len(moved), len(zones)) * self._z_per_length[zones]
 
 
-def _rotation(turn: Floats) -> Floats:
-    """(3, 3) of a rotation vector."""
+def rotation_by(turn: Floats) -> Floats:
+    """(3, 3) of a rotation vector [rad]."""
     angle = float(np.linalg.norm(turn))
     if angle == 0.0:
         return np.eye(3)
     x, y, z = turn / angle
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+    rotation: Floats = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+    return rotation
 
 
 def _check(
@@ -220,7 +228,7 @@ def _check(
     whole &= np.isfinite(sigma[zones])
     seen = _Expected(zones[whole], predicted[whole], slopes[whole], sigma[zones[whole]])
     score, used, gaps = seen.judge(ranges)
-    wrong = score > _THRESHOLD or gaps >= max(_MIN_GAPS, used.size)
+    wrong = score > THRESHOLD or gaps >= max(_MIN_GAPS, used.size)
     at = _fitted(view, used, ranges, sigma) if wrong else np.zeros(6)
     return MountCheck(
         sensor=row, name=name, zones=int(used.size), visible=_visible(view, seen),
@@ -262,7 +270,7 @@ def _visible(view: _View, seen: _Expected) -> tuple[str, ...]:
     views[:, seen.zones] = view(np.concatenate([sizes, -sizes]), seen.zones)
     scores = np.array([seen.judge(ranges)[0] for ranges in views]).reshape(2, 6)
     # Patnaik: the root of a large chi squared is about normal, with unit variance.
-    found = np.sqrt(scores).min(axis=0) > np.sqrt(_THRESHOLD) + norm.isf(_MISSED)
+    found = np.sqrt(scores).min(axis=0) > np.sqrt(THRESHOLD) + _SURE
     return tuple(axis for axis, sure in zip(_AXES, found, strict=True) if sure)
 
 
@@ -287,7 +295,7 @@ def _smooth(
 
 def _fitted(view: _View, zones: NDArray[np.intp], ranges: Floats, sigma: Floats) -> Floats:
     """Where the mount must be for what was seen, as near to where it should be as that allows."""
-    at = np.zeros(6)
+    at: Floats = np.zeros(6)
     for _ in range(_ROUNDS):
         chosen, seen, slopes = _smooth(view, at, zones)
         if not chosen.size:

@@ -10,7 +10,7 @@ import numpy as np
 from proxcgal import _core
 from proxcgal.errors import ConfigError
 from proxcgal.sim.ranges import NO_TARGET, VALID, ZONES
-from proxcgal.sim.scenario_keys import FAULT_VALUES, INPUT_FAULTS, Fault
+from proxcgal.sim.scenario_keys import FAULT_VALUES, INPUT_FAULTS, MOUNT_FAULTS, Fault
 from proxcgal.sim.ticks import TickInput
 
 _STREAM = 2  # of the seed; the sensors' noise draws from another
@@ -39,13 +39,13 @@ class FaultInjector:
         for place, fault in enumerate(faults):
             if fault.kind in INPUT_FAULTS:
                 continue
-            rows = _rows(fault.sensor, sensors)
+            rows = rows_of(fault, sensors)
             if rows is None:
                 problems.append(
                     f"fault.{place}.sensor = {fault.sensor!r}: unknown; a row from 0 to "
                     f'{len(sensors) - 1}, "all", or one of {", ".join(sensors)}'
                 )
-            else:
+            elif fault.kind not in MOUNT_FAULTS:  # those are the world's
                 self._faults.append(_Injected(fault, rows, (seed, _STREAM, place)))
         if problems:
             raise ConfigError("\n".join(problems))
@@ -63,8 +63,7 @@ class FaultInjector:
 
 def _spoiled_input(fault: Fault, given: TickInput) -> TickInput:
     end = np.inf if fault.end is None else fault.end
-    usual = FAULT_VALUES.get(fault.kind, ("", 0.0))[1]
-    value = usual if fault.value is None else fault.value
+    value = value_of(fault)
     if fault.kind == "clock_jump":  # a clock that jumped stays so: `to` jumps back
         shift = value if fault.start <= given.time < end else 0.0
         scans = tuple(
@@ -76,6 +75,8 @@ def _spoiled_input(fault: Fault, given: TickInput) -> TickInput:
         return given
     if fault.kind == "joints_old":
         return replace(given, q_stamp=given.time - value)
+    if fault.kind == "joints_nan":
+        return replace(given, q=np.full_like(given.q, np.nan))
     return replace(given, late=True)
 
 
@@ -86,12 +87,12 @@ class _Injected:
         self._kind = fault.kind
         self._start = fault.start
         self._end = np.inf if fault.end is None else fault.end
-        usual = FAULT_VALUES.get(fault.kind, ("", 0.0))[1]
-        self._value = usual if fault.value is None else fault.value
+        self._value = value_of(fault)
         self._rows = rows
         self._key = key
         self._last: dict[int, _core.Scan] = {}
         self._waiting: list[_core.Scan] = []
+        self._held: dict[int, _core.Scan] = {}
 
     def apply(self, time: float, scans: Sequence[_core.Scan]) -> list[_core.Scan]:
         out = []
@@ -101,6 +102,12 @@ class _Injected:
                 out.append(scan)
             elif self._kind == "delay":
                 self._waiting.append(scan)
+            elif self._kind == "swapped":
+                earlier = self._held.pop(scan.sensor, None)
+                if earlier is None:
+                    self._held[scan.sensor] = scan
+                else:
+                    out += [scan, earlier]
             elif self._kind != "silent":
                 out.append(self._spoil(scan))
                 if self._kind == "duplicate":
@@ -139,7 +146,15 @@ class _Injected:
         return _core.Scan(scan.sensor, counter, stamp, ranges, status)
 
 
-def _rows(sensor: int | str, names: Sequence[str]) -> frozenset[int] | None:
+def value_of(fault: Fault) -> float:
+    """The fault's value, or what it is where the file leaves it out."""
+    usual = FAULT_VALUES.get(fault.kind, ("", 0.0))[1]
+    return usual if fault.value is None else fault.value
+
+
+def rows_of(fault: Fault, names: Sequence[str]) -> frozenset[int] | None:
+    """Rows of the skin that a fault hits; None where there is no such sensor."""
+    sensor = fault.sensor
     if sensor == "all":
         return frozenset(range(len(names)))
     if isinstance(sensor, int):

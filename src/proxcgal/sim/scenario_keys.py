@@ -32,12 +32,18 @@ FaultKind = Literal[
     "delay",
     "duplicate",
     "stamp_offset",
+    "swapped",
     "joints_old",
+    "joints_nan",
     "clock_jump",
     "late",
+    "mount_offset",
+    "mount_turn",
 ]
 #: Those of the tick's other inputs; `sensor` says nothing there.
-INPUT_FAULTS = ("joints_old", "clock_jump", "late")
+INPUT_FAULTS = ("joints_old", "joints_nan", "clock_jump", "late")
+#: Those of the world: where a sensor really sits, other than the skin says.
+MOUNT_FAULTS = ("mount_offset", "mount_turn")
 #: What `value` means to a fault, and what it is where the file leaves it out; others take none.
 FAULT_VALUES: dict[str, tuple[str, float]] = {
     "dropout": ("share of zones lost, 0 to 1", 0.5),
@@ -46,6 +52,8 @@ FAULT_VALUES: dict[str, tuple[str, float]] = {
     "status": ("every zone's status code, 0 to 255", 4.0),
     "stamp_offset": ("added to every scan's stamp [s]", 0.03),
     "joints_old": ("age of the joint state [s]", 0.05),
+    "mount_offset": ("how far the sensor sits from its mount, which way is drawn [m]", 0.005),
+    "mount_turn": ("how far it is turned, about which axis is drawn [rad]", 0.0349),
     "clock_jump": ("the caller's clock goes on from this much later, or earlier [s]", 3600.0),
 }
 
@@ -154,6 +162,11 @@ class Skin(Section):
 
     rings: tuple[Ring, ...] = Field(min_length=1, description="at least one")
     sensor: Sensor = Field(default_factory=Sensor)
+    check_mounts: bool = Field(
+        True,
+        description="compare what sensors see of the arm itself with their mounts, 2 s before the "
+        "run; wrong ones refuse it",
+    )
 
 
 class Simulation(Section):
@@ -245,6 +258,9 @@ class Fault(Section):
     value: float | None = Field(
         None, description="of the kind, in its unit; the table below has them"
     )
+    axis: Literal["x", "y", "z"] | None = Field(
+        None, description="of the sensor's frame, for mount_offset and mount_turn; left out: drawn"
+    )
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -252,6 +268,8 @@ class Fault(Section):
             raise ValueError(f"to = {self.end:g} must be later than from = {self.start:g}")
         if self.value is not None and self.kind not in FAULT_VALUES:
             raise ValueError(f"kind {self.kind} takes no value; {', '.join(FAULT_VALUES)} do")
+        if self.axis is not None and self.kind not in MOUNT_FAULTS:
+            raise ValueError(f"kind {self.kind} takes no axis; {', '.join(MOUNT_FAULTS)} do")
         if self.kind == "dropout" and not 0.0 <= (self.value or 0.0) <= 1.0:
             raise ValueError("value must be a share between 0 and 1")
         if self.kind == "delay" and (self.value or 0.0) < 0.0:

@@ -9,12 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxcgal import _core
+from proxcgal.sim.mounting import RealMounts
 from proxcgal.sim.ranges import ZONES, RangeModel
 from proxcgal.sim.setup import Setup
 from proxcgal.sim.ticks import TickInput
-from proxcgal.sim.world import World
+from proxcgal.sim.world import Hits, World
 
 Array = NDArray[np.float64]
+
+
+_BEFORE = 1 << 20  # index of the scans before the run: their noise is none of the run's
 
 
 class Source(Protocol):
@@ -69,9 +73,25 @@ class SimulatedSource:
         links = list(setup.robot.link_names)
         mounts = setup.skin.mounts
         self._links = np.array([links.index(mount.link) for mount in mounts], np.intp)
-        self._T_LS = np.array([mount.T_LS for mount in mounts]).reshape(-1, 4, 4)
+        self._mounts = RealMounts(mounts, setup.scenario.faults, seed)
         #: (sensors, 64) true where the last scan really saw the robot itself.
         self.saw_robot: NDArray[np.bool_] = np.zeros((sensors, ZONES), bool)
+
+    @property
+    def q(self) -> Array:
+        """(n_q,) where the arm really is."""
+        return self._q
+
+    def standing(self, scans: int) -> list[_core.Scan]:
+        """What every sensor would send before the run, the arm at rest where it starts."""
+        assert self._world is not None
+        rows = list(range(len(self._links)))
+        hits = self._cast(rows, 0.0, self._setup.q0)
+        told = []
+        for index in range(_BEFORE, _BEFORE + scans):
+            ranges, status = self._ranges.measure(rows, index, hits.length)
+            told += [_core.Scan(row, index, 0.0, ranges[row], status[row]) for row in rows]
+        return told
 
     def read(self) -> TickInput | None:
         """Moves the arm by the last command and collects the scans made on the way."""
@@ -99,10 +119,7 @@ class SimulatedSource:
     def _measure(self, rows: list[int], stamp: float, q: Array) -> list[_core.Scan]:
         """Scans of the sensors that measure together; they share one index."""
         assert self._world is not None
-        self._world.place(q, stamp)
-        T_WS = self._setup.robot.link_poses(q)[self._links[rows]] @ self._T_LS[rows]
-        directions_W = self._ranges.rays_S @ np.swapaxes(T_WS[:, :3, :3], 1, 2)
-        hits = self._world.cast(T_WS[:, :3, 3], directions_W, self._mounting)
+        hits = self._cast(rows, stamp, q)
         index = int(self._scans[rows[0]])
         ranges, status = self._ranges.measure(rows, index, hits.length)
         self.saw_robot[rows] = self._ranges.pick(hits.length, hits.robot)
@@ -110,3 +127,11 @@ class SimulatedSource:
         return [
             _core.Scan(row, index, stamp, ranges[at], status[at]) for at, row in enumerate(rows)
         ]
+
+    def _cast(self, rows: list[int], time: float, q: Array) -> Hits:
+        """What the rays of some sensors meet, from where these really are."""
+        assert self._world is not None
+        self._world.place(q, time)
+        T_WS = self._setup.robot.link_poses(q)[self._links[rows]] @ self._mounts.at(time)[rows]
+        directions_W = self._ranges.rays_S @ np.swapaxes(T_WS[:, :3, :3], 1, 2)
+        return self._world.cast(T_WS[:, :3, 3], directions_W, self._mounting)

@@ -14,6 +14,7 @@ from proxcgal.models import Robot
 from proxcgal.sim.decisive import decisive_truth
 from proxcgal.sim.faults import FaultInjector
 from proxcgal.sim.loop import run_ticks
+from proxcgal.sim.mounting import require_mounts
 from proxcgal.sim.recorder import Recorder, Settings
 from proxcgal.sim.replay import first_difference, recompute
 from proxcgal.sim.scenario import CONTROLLERS, Scenario
@@ -39,6 +40,7 @@ def run_trial(
     recorder: Recorder | None = None,
     on_progress: Progress | None = None,
     sparse_truth: bool = False,
+    without_truth: bool = False,
 ) -> TrialLog:
     """Simulates a scenario with one controller.
 
@@ -51,9 +53,10 @@ def run_trial(
         on_progress: told the share that is done, 0 to 1, once each tenth of a simulated second.
         sparse_truth: true distances only where they can change a number of the summary, which
             stays exact; nan elsewhere. A recording has them at every tick.
+        without_truth: none at all, for studies of other things; not for a recording.
 
     Raises:
-        ConfigError: what of the scenario does not fit.
+        ConfigError: what of the scenario does not fit; sensors that do not sit where it says.
         SimulationError: the simulator warned.
     """
     begin = clock.perf_counter()
@@ -64,7 +67,10 @@ def run_trial(
     faults = FaultInjector(scenario.faults, [mount.name for mount in setup.skin.mounts], seed)
     world = World(setup.robot, setup.scene) if known is None else None
     source = SimulatedSource(setup, world, seed)
-    truth = None if sparse_truth and recorder is None else Truth(setup.robot, setup.scene)
+    if world is not None and scenario.skin.check_mounts:
+        require_mounts(setup, source)
+    sparse = (sparse_truth or without_truth) and recorder is None
+    truth = None if sparse else Truth(setup.robot, setup.scene)
     log = None
     if recorder is not None:
         recorder.start(
@@ -77,11 +83,13 @@ def run_trial(
         )  # fmt: skip
         log = _Log(recorder, setup, scenario.simulation.sensor_hz)
     ticks: list[Tick] = []
+    reached: list[Array] = []  # where the arm really was: a fault may tell the controller otherwise
     period = law.config.period
     beat = max(round(0.1 * scenario.simulation.control_hz), 1)
     for given, result in run_ticks(source, law, faults, known):
+        reached.append(source.q)
         leaked = 0 if known is not None else _leaked(law, source)
-        true = NOT_ASKED if truth is None else truth(given.q, len(ticks) * period)
+        true = NOT_ASKED if truth is None else truth(source.q, len(ticks) * period)
         ticks.append(Tick(given, result, TickTruth(true.distance, true.link, true.own, leaked)))
         if log is not None:
             log.write(ticks[-1], (len(ticks) - 1) * period, law)
@@ -91,8 +99,8 @@ def run_trial(
         on_progress(1.0)
     # Not the ticks' own time, which a fault may make jump.
     elapsed = np.arange(len(ticks), dtype=np.float64) * period
-    if truth is None:
-        ticks = _with_truth(ticks, elapsed, setup)
+    if truth is None and not without_truth:
+        ticks = _with_truth(ticks, elapsed, np.array(reached), setup)
     return TrialLog.of(
         ticks, setup.robot, scenario=scenario.name, controller=controller, seed=seed,
         wall_s=clock.perf_counter() - begin, elapsed=elapsed,
@@ -100,9 +108,8 @@ def run_trial(
     )  # fmt: skip
 
 
-def _with_truth(ticks: Sequence[Tick], elapsed: Array, setup: Setup) -> list[Tick]:
+def _with_truth(ticks: Sequence[Tick], elapsed: Array, q: Array, setup: Setup) -> list[Tick]:
     """The ticks with the true distances that the summary needs."""
-    q = np.array([tick.given.q for tick in ticks])
     asked = decisive_truth(
         setup.robot, setup.scene, elapsed, q, final_ticks(elapsed), under=TOO_CLOSE
     )

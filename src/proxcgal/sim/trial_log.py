@@ -68,7 +68,7 @@ class TrialLog:
         results = [tick.result for tick in ticks]
         truths = [tick.truth for tick in ticks]
         time = np.array([g.time for g in given])
-        tools = np.array([robot.tool_pose(g.q) for g in given]).reshape(-1, 4, 4)
+        tools = np.array([_tool(robot, g.q) for g in given]).reshape(-1, 4, 4)
         goals = np.array([g.goal for g in given]).reshape(-1, 4, 4)
         found = Counter(
             reason for r in results for reason in sorted({f.reason for f in r.findings})
@@ -130,6 +130,11 @@ def _least(distances: Array) -> float:
 def _points(points: Sequence[Sequence[float] | None]) -> Array:
     nothing = (np.nan,) * 3
     return np.array([p or nothing for p in points], np.float64).reshape(-1, 3)
+
+
+def _tool(robot: Robot, q: Array) -> Array:
+    """(4, 4) T_WT; nan where a fault told the controller no posture."""
+    return np.asarray(robot.tool_pose(q)) if np.isfinite(q).all() else np.full((4, 4), np.nan)
 
 
 def _angles(here: Array, there: Array) -> Array:

@@ -23,7 +23,10 @@ class Row:
     within: float  # [s] from the fault's onset
     finding: str = ""  # that must be told
     same_commands: bool = False  # as without the fault, to the bit
-    duration: float = 1.0  # [s] of the fault
+    duration: float = 0.6  # [s] of the fault
+    settings: Sequence[str] = ()  # of the scenario, beside the campaign's own
+    no_flight: bool = False  # the arm never avoids itself
+    refused: bool = False  # the run must not begin, for that very sensor
 
 
 def one(kind: str, value: float | None = None) -> Callable[[int], Sequence[Fault]]:
@@ -46,13 +49,20 @@ def array(kind: str) -> Callable[[int], Sequence[Fault]]:
     return faults
 
 
-def every(kind: str) -> Callable[[int], Sequence[Fault]]:
+def every(kind: str, value: float | None = None) -> Callable[[int], Sequence[Fault]]:
     """The fault of all sensors."""
-    return lambda _: [{"kind": kind, "sensor": "all"}]
+
+    def faults(_: int) -> Sequence[Fault]:
+        fault: Fault = {"kind": kind, "sensor": "all"}
+        return [fault if value is None else fault | {"value": value}]
+
+    return faults
 
 
 #: A silent sensor degrades; where the arm moves into what it covered, it holds.
 _BLIND = {"least": DEGRADED, "most": HOLD, "within": 0.15, "finding": "sensor_silent"}
+
+_FAST = ("controller.max_linear=1.0", "controller.max_angular=2.0", "controller.reach_gain=4.0")
 
 ROWS: tuple[Row, ...] = (
     Row(name="sensor silent", faults=one("silent"), **_BLIND),  # type: ignore[arg-type]
@@ -74,12 +84,23 @@ ROWS: tuple[Row, ...] = (
     Row(name="status 9", faults=one("status", 9.0), least=RUN, most=RUN, within=0.0),
     Row(name="status 255 (no target)", faults=one("status", 255.0), least=RUN, most=RUN,
         within=0.0),
+    Row(name="half of the zones lost", faults=one("dropout", 0.5), least=RUN, most=RUN,
+        within=0.0),
+    Row(name="empty cloud", faults=every("status", 255.0), least=RUN, most=RUN, within=0.0),
+    Row(name="scans out of order", faults=one("swapped"), least=RUN, most=DEGRADED, within=0.0,
+        finding="scan_refused"),
     Row(name="scans twice", faults=one("duplicate"), least=RUN, most=RUN, within=0.0,
         finding="scan_refused", same_commands=True),
     Row(name="stamps of the future", faults=one("stamp_offset", 1.0), **_BLIND),  # type: ignore[arg-type]
     Row(name="stamps of long ago", faults=one("stamp_offset", -1.0), **_BLIND),  # type: ignore[arg-type]
     Row(name="stamps 30 ms late", faults=one("stamp_offset", -0.03), least=RUN, most=RUN,
-        within=0.0),
+        within=0.0, no_flight=True),
+    Row(name="all stamps 30 ms late, fast", faults=every("stamp_offset", -0.03), least=RUN,
+        most=RUN, within=0.0, no_flight=True, settings=_FAST),
+    # From the future: refused, so that the array is silent.
+    Row(name="stamps 30 ms early", faults=one("stamp_offset", 0.03), **_BLIND),  # type: ignore[arg-type]
+    Row(name="all stamps 30 ms early, fast", faults=every("stamp_offset", 0.03), least=HOLD,
+        most=HOLD, within=0.2, finding="all_sensors_silent", settings=_FAST),
     Row(name="scans arrive 0.3 s late", faults=one("delay", 0.3), **_BLIND),  # type: ignore[arg-type]
     Row(name="clock an hour ahead", faults=one("clock_jump", 3600.0), least=RUN, most=RUN,
         within=0.0, finding="time_invalid", same_commands=True),
@@ -89,8 +110,14 @@ ROWS: tuple[Row, ...] = (
         within=0.02, finding="joint_state_stale"),
     Row(name="joint state 150 ms old", faults=one("joints_old", 0.15), least=STOP, most=STOP,
         within=0.02, finding="joint_state_lost"),
+    Row(name="joint state not a number", faults=one("joints_nan"), least=STOP, most=STOP,
+        within=0.0, finding="joint_state_invalid", duration=0.01),
     Row(name="one deadline missed", faults=one("late"), least=RUN, most=RUN, within=0.0,
         finding="deadline_missed", duration=0.01),
     Row(name="deadlines missed", faults=one("late"), least=HOLD, most=HOLD, within=0.04,
         finding="deadlines_missed"),
+    Row(name="mount 5 mm off", faults=one("mount_offset"), least=RUN, most=RUN, within=0.0,
+        refused=True),
+    Row(name="mount 2 degrees off", faults=one("mount_turn"), least=RUN, most=RUN, within=0.0,
+        refused=True),
 )  # fmt: skip

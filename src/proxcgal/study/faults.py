@@ -10,16 +10,22 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from proxcgal.errors import ConfigError
+from proxcgal.sim.mounting import look
 from proxcgal.sim.scenario import load_scenario
+from proxcgal.sim.scenario_keys import FAULT_VALUES
 from proxcgal.sim.setup import Setup
+from proxcgal.sim.source import SimulatedSource
+from proxcgal.sim.world import World
 from proxcgal.study.analysis import Summary
 from proxcgal.study.campaign import Campaign, Trial, plain
-from proxcgal.study.fault_rows import DEGRADED, HOLD, MODES, ROWS, RUN, STOP, Row
+from proxcgal.study.fault_rows import DEGRADED, HOLD, MODES, ROWS, RUN, STOP, Fault, Row
 from proxcgal.study.figures import DPI, GREY
 from proxcgal.study.kind import Kind, Listing, Wishes
 from proxcgal.study.trials import identity, robot_of, simulate
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from proxcgal.sim.scenario import Scenario
     from proxcgal.sim.trial import TrialLog
     from proxcgal.study.jobs import Report
@@ -27,12 +33,15 @@ if TYPE_CHECKING:
 
 #: Scenes in which the arm moves, and every sensor sees a room.
 SCENES = ("timing_ur10e", "timing_panda")
-SET = ("goal.offset=[0.0, 0.25, 0.05]", "duration=3.5", "vertices_per_link=1000")
-EARLIEST, LATEST = 0.8, 1.2  # [s] of the onset, drawn
+SET = (
+    "goal.offset=[0.0, 0.25, 0.05]", "duration=1.9", "vertices_per_link=1000",
+    "skin.check_mounts=false",
+)  # fmt: skip
+EARLIEST, LATEST = 0.3, 0.6  # [s] of the onset, drawn: the arm moves
 RECOVERY = 0.5  # [s] after the fault's end, by when the arm must be free again
 COLUMNS = (
     "right", "latency_ms", "reached", "worst_mode", "told", "recovered", "same_commands",
-    "qd_max", "true_min_m",
+    "no_flight", "qd_max",
 )  # fmt: skip
 TICK_MS = 10  # a fault is answered at the next tick
 _SLACK = 1e-9  # [s] a tick at the bound is in time
@@ -51,7 +60,9 @@ def plan(wishes: Wishes) -> Campaign:
     for source in wishes.scenarios or SCENES:
         base = load_scenario(source, (*SET, *wishes.overrides))
         robot = robot_of(base)
-        sensors = len(Setup.of(base, robot).skin)
+        setup = Setup.of(base, robot)
+        sensors = len(setup.skin)
+        mounts = _visible(setup)
         if plain(base.robot) in robots:  # the table is read by robot
             raise ConfigError(f"--scenario {source}: there is another one with {base.robot}")
         robots.add(plain(base.robot))
@@ -60,9 +71,13 @@ def plan(wishes: Wishes) -> Campaign:
             for number in range(wishes.runs):
                 draw = np.random.default_rng([wishes.seed, number, place])
                 onset = round(float(draw.uniform(EARLIEST, LATEST)), 3)
-                faults = row.faults(int(draw.integers(sensors)))
-                text = _assignment(faults, onset, onset + row.duration)
-                overrides = (*SET, *wishes.overrides, text)
+                if row.refused:
+                    faults: Sequence[Fault] = _mount_faults(row, mounts, draw)
+                    text = _assignment(faults, 0.0, float(base.duration))
+                else:
+                    faults = row.faults(int(draw.integers(sensors)))
+                    text = _assignment(faults, onset, onset + row.duration)
+                overrides = (*SET, *row.settings, *wishes.overrides, text)
                 trials.append(
                     Trial(
                         scenario=load_scenario(source, overrides), source=source,
@@ -80,6 +95,27 @@ def plan(wishes: Wishes) -> Campaign:
     return Campaign(description=description, trials=trials, perform=perform, columns=COLUMNS)
 
 
+def _visible(setup: Setup) -> list[tuple[int, str]]:
+    """Sensors and directions in which a wrong mount can be found at the scene's start."""
+    source = SimulatedSource(setup, World(setup.robot, setup.scene), seed=0)
+    checks = look(setup, source).sensors
+    return [(check.sensor, axis) for check in checks for axis in check.visible]
+
+
+def _mount_faults(
+    row: Row, mounts: Sequence[tuple[int, str]], draw: np.random.Generator
+) -> list[Fault]:
+    """The row's fault at one of those sensors, in one of those directions, either way."""
+    (fault,) = row.faults(0)
+    turns = fault["kind"] == "mount_turn"
+    there = [(sensor, axis) for sensor, axis in mounts if axis.startswith("turn") == turns]
+    if not there:
+        raise ConfigError(f"no sensor sees enough of the arm to tell {row.name!r} at this start")
+    sensor, axis = there[int(draw.integers(len(there)))]
+    size = FAULT_VALUES[str(fault["kind"])][1] * float(draw.choice([-1.0, 1.0]))
+    return [fault | {"sensor": sensor, "axis": axis[-1], "value": size}]
+
+
 def _assignment(faults: Any, start: float, end: float) -> str:
     """The `[[fault]]` tables as one assignment."""
     tables = []
@@ -95,6 +131,8 @@ def _assignment(faults: Any, start: float, end: float) -> str:
 def perform(trial: Trial, report: Report) -> Numbers:
     """One trial beside its row's requirements."""
     row = _ROW_OF[str(trial.tags["row"])]
+    if row.refused:
+        return _refused(trial, report)
     log = _simulate(trial, trial.scenario, report)
     # By ticks, because the caller's clock may be what jumps.
     time = log.elapsed
@@ -107,8 +145,10 @@ def perform(trial: Trial, report: Report) -> Numbers:
     recovered = row.least == STOP or bool((log.mode[free] == RUN).all())
     told = not row.finding or log.findings.get(row.finding, 0) > 0
     same = not row.same_commands or _same_commands(trial, log, report)
+    calm = not ((log.leaked_points > 0) & (log.activation > 0.0)).any()
     in_time = row.least == RUN or latency <= row.within + TICK_MS / 1000.0 + _SLACK
     right = in_time and worst <= row.most and told and recovered and same
+    right = right and (calm or not row.no_flight)
     return {
         "right": bool(right and np.isfinite(log.qd).all()),
         "latency_ms": 1000.0 * latency if np.isfinite(latency) and row.least > RUN else None,
@@ -117,9 +157,23 @@ def perform(trial: Trial, report: Report) -> Numbers:
         "told": told,
         "recovered": recovered,
         "same_commands": same,
+        "no_flight": calm,
         "qd_max": float(np.abs(log.qd).max()),
-        "true_min_m": log.summary()["true_min_m"],
     }
+
+
+def _refused(trial: Trial, report: Report) -> Numbers:
+    """Is that very sensor found before the run, and no other?"""
+    setup = Setup.of(trial.scenario, robot_of(trial.scenario, trial.robot_digest))
+    source = SimulatedSource(setup, World(setup.robot, setup.scene), trial.seed)
+    wrong = [check.sensor for check in look(setup, source).wrong]
+    report(1.0)
+    found = wrong == [fault.sensor for fault in trial.scenario.faults]
+    return {
+        "right": found, "latency_ms": None, "reached": found,
+        "worst_mode": "refused" if wrong else "began", "told": found, "recovered": True,
+        "same_commands": True, "no_flight": True, "qd_max": 0.0,
+    }  # fmt: skip
 
 
 def _same_commands(trial: Trial, log: TrialLog, report: Report) -> bool:
@@ -129,7 +183,10 @@ def _same_commands(trial: Trial, log: TrialLog, report: Report) -> bool:
 
 
 def _simulate(trial: Trial, scenario: Scenario, report: Report) -> TrialLog:
-    return simulate(scenario, trial.controller, trial.seed, report, robot_digest=trial.robot_digest)
+    return simulate(
+        scenario, trial.controller, trial.seed, report,
+        robot_digest=trial.robot_digest, without_truth=True,
+    )  # fmt: skip
 
 
 def analyse(table: pl.DataFrame, campaign: Campaign) -> Summary:
@@ -170,7 +227,8 @@ def listings(summary: Summary) -> list[Listing]:
             )  # fmt: skip
     return [
         Listing(
-            caption="Every fault lasts 1 s (one missed deadline: a tick) and begins at a random "
+            caption="Every fault lasts 0.6 s (one missed deadline, a joint state that is not a "
+            "number: a tick) and begins at a random "
             "moment, at a random sensor. Right: the required mode in time and no other, the "
             "finding told, the arm free again 0.5 s after the fault; where no command may change, "
             "the same commands to the bit as without it. Latency from the fault's onset, told at "
@@ -184,6 +242,8 @@ def listings(summary: Summary) -> list[Listing]:
 
 
 def _required(row: Row) -> str:
+    if row.refused:
+        return "refused"
     if row.least == row.most:
         return MODES[row.least]
     return f"{MODES[row.least]} or {MODES[row.most]}"

@@ -31,6 +31,7 @@ def simulate(
     recording: Path | None = None,
     ticks: RecordedTicks = "all",
     robot_digest: str | None = None,
+    without_truth: bool = False,
 ) -> TrialLog:
     """Runs a trial in a worker process.
 
@@ -42,6 +43,7 @@ def simulate(
         recording: where to record to; without, true distances are asked only where they decide.
         ticks: which of them the recording holds.
         robot_digest: of the robot that it must be; left out: any.
+        without_truth: no true distances at all, without a recording.
 
     Raises:
         ProxError: what of the scenario does not fit, another robot; the simulator warned.
@@ -54,8 +56,9 @@ def simulate(
         robot = robot_of(scenario, robot_digest)
         if recording is None:
             return run_trial(
-                scenario, controller, seed=seed, robot=robot, on_progress=report, sparse_truth=True
-            )
+                scenario, controller, seed=seed, robot=robot, on_progress=report,
+                sparse_truth=True, without_truth=without_truth,
+            )  # fmt: skip
         with Recorder(recording, ticks) as recorder:
             return run_trial(
                 scenario, controller, seed=seed, robot=robot, recorder=recorder, on_progress=report
