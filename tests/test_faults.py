@@ -1,16 +1,29 @@
 """Faults in running trials: the rows of the campaign, and a few of them run."""
 
+import re
+from pathlib import Path
+
+import numpy as np
 import pytest
 
+import proxcgal as px
+from proxcgal import _core
+from proxcgal.sim.faults import FaultInjector
 from proxcgal.sim.scenario import load_scenario
+from proxcgal.sim.scenario_keys import Fault
+from proxcgal.sim.ticks import TickInput
 from proxcgal.study.campaign import Trial
 from proxcgal.study.fault_rows import DEGRADED, HOLD, ROWS, RUN
 from proxcgal.study.faults import KIND, perform, plan
 from proxcgal.study.kind import Wishes
+from proxcgal.study.reliability import GOALS
+from proxcgal.study.reliability import SHOWN as SHOWN_BY_TESTS
 
 SHOWN = (
-    "sensor silent", "array silent", "range nan", "same payload", "clock an hour back",
-    "joint state 50 ms old", "deadlines missed",
+    "sensor silent", "array silent", "range nan", "same payload", "scans out of order",
+    "all stamps 30 ms late, fast", "all stamps 30 ms early, fast", "clock an hour back",
+    "joint state 50 ms old", "joint state not a number", "deadlines missed", "mount 5 mm off",
+    "mount 2 degrees off",
 )  # fmt: skip
 
 
@@ -69,3 +82,59 @@ def test_the_campaign_lists_wrong_rows_by_name() -> None:
     ]
     (listing,) = KIND.listings(summary)
     assert "250" in str(listing)
+
+
+def test_every_status_code_is_judged_as_the_table_has_it() -> None:
+    model = px.SensorModel()
+    for code in range(256):
+        scan = px.Scan(0, 0, 0.0, np.full(64, 0.5), np.full(64, code, np.uint8))
+        zones, _, _, sigmas = _core.sense(model, scan)
+        assert len(zones) == (64 if code in (5, 6, 9) else 0), code
+        if code in (6, 9):
+            sure = px.Scan(0, 0, 0.0, np.full(64, 0.5), np.full(64, 5, np.uint8))
+            assert (sigmas > _core.sense(model, sure)[3]).all()
+
+
+def through(kind: str, ticks: int) -> list[TickInput]:
+    fault = Fault.model_validate({"kind": kind, "sensor": 0, "from": 0.0})
+    inject = FaultInjector([fault], ["a", "b"], seed=0)
+    ranges, status = np.full(64, 0.5), np.full(64, 5, np.uint8)
+    return [
+        inject(
+            TickInput(
+                0.1 * n, np.zeros(6), np.eye(4),
+                tuple(px.Scan(row, n, 0.1 * n, ranges, status) for row in range(2)),
+            )
+        )
+        for n in range(ticks)
+    ]  # fmt: skip
+
+
+def test_swapped_scans_come_in_pairs_the_later_first() -> None:
+    given = through("swapped", 6)
+    assert [s.counter for g in given for s in g.scans if s.sensor == 0] == [1, 0, 3, 2, 5, 4]
+    assert [s.counter for g in given for s in g.scans if s.sensor == 1] == list(range(6))
+
+
+def test_a_joint_state_that_is_not_a_number_is_all_of_it() -> None:
+    assert all(np.isnan(given.q).all() for given in through("joints_nan", 3))
+
+
+ROOT = Path(__file__).parents[1]
+PAGE = ROOT / "docs" / "reliability.md"
+
+
+def test_the_page_has_the_campaigns_rows_and_no_other() -> None:
+    text = PAGE.read_text()
+    part = text[text.index("| fault |") : text.index("## Shown by tests")]
+    told = dict.fromkeys(line.split(" | ")[0][2:] for line in part.splitlines()[2:] if "|" in line)
+    assert list(told) == [row.name for row in ROWS]
+    for shown in SHOWN_BY_TESTS:
+        assert f"| {shown.fault} | {shown.required} |" in text
+    for goal in GOALS:
+        assert f"| {goal.goal} |" in text
+
+
+def test_every_test_that_the_page_names_exists() -> None:
+    for file, name in {test for entry in (*SHOWN_BY_TESTS, *GOALS) for test in entry.tests}:
+        assert re.search(rf"\b{re.escape(name)}\b", (ROOT / file).read_text()), f"{file} {name}"

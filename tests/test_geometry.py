@@ -117,3 +117,55 @@ def test_bad_queries_are_refused_by_name():
         tree.first_hit([[0, 0, 0]], [[0, 0, 0]])
     with pytest.raises(px.GeometryError, match="one direction for each origin"):
         tree.first_hit([[0, 0, 0]], [[0, 0, 1], [0, 0, 1]])
+
+
+def test_winding_number_agrees_with_libigl(robot):
+    rng = np.random.default_rng(2)
+    for link in robot.link_names:
+        vertices, triangles = robot.mesh(link)
+        points = queries(rng, vertices, 200)
+        found = robot.tree(link).winding_number(points)
+        expected = igl.winding_number(vertices, triangles.astype(np.int64), points)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9)
+
+
+def test_signed_distance_agrees_with_libigl_on_whole_robots(robot):
+    rng = np.random.default_rng(3)
+    q = rng.uniform(np.maximum(robot.q_min, -2.0), np.minimum(robot.q_max, 2.0))
+    poses = robot.link_poses(q)
+    corners = np.concatenate(
+        [
+            robot.mesh(n)[0] @ T[:3, :3].T + T[:3, 3]
+            for n, T in zip(robot.link_names, poses, strict=True)
+        ]
+    )
+    points = corners[rng.integers(len(corners), size=300)] + rng.normal(0, 0.03, (300, 3))
+    found = px.signed_distance(robot, q, points)
+    signed = []
+    for name, T in zip(robot.link_names, poses, strict=True):
+        vertices, triangles = robot.mesh(name)
+        points_L = (points - T[:3, 3]) @ T[:3, :3]
+        squared, *_ = igl.point_mesh_squared_distance(
+            points_L, vertices, triangles.astype(np.int64)
+        )
+        around = np.abs(igl.winding_number(vertices, triangles.astype(np.int64), points_L))
+        signed.append(np.sqrt(squared) * np.where(around > 0.5, -1.0, 1.0))
+    np.testing.assert_allclose(found.distance, np.min(signed, axis=0), rtol=0, atol=1e-9)
+    assert found.link == [robot.link_names[k] for k in np.argmin(signed, axis=0)]
+    assert (found.distance < 0).sum() > 20
+    # A step along the normal is a step out by its length.
+    np.testing.assert_allclose(
+        found.surface_W + found.distance[:, None] * found.normal_W, points, atol=1e-9
+    )
+    np.testing.assert_allclose(np.linalg.norm(found.normal_W, axis=1), 1.0, atol=1e-9)
+
+
+def test_inside_a_convex_mesh_is_behind_all_of_its_faces():
+    sphere = trimesh.creation.icosphere(subdivisions=3, radius=0.2)
+    points = np.random.default_rng(4).uniform(-0.3, 0.3, (500, 3))
+    around = px.MeshTree(sphere.vertices, sphere.faces).winding_number(points)
+    corners = np.asarray(sphere.vertices)[sphere.faces[:, 0]]
+    ahead = np.einsum("pfk,fk->pf", points[:, None] - corners, sphere.face_normals)
+    inside = (ahead < 0).all(axis=1)
+    np.testing.assert_allclose(around, inside, atol=1e-9)
+    assert 50 < inside.sum() < 450

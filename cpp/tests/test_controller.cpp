@@ -10,6 +10,7 @@
 #include "allocations.hpp"
 #include "proxcgal/controller.hpp"
 #include "proxcgal/error.hpp"
+#include "repeats.hpp"
 #include "robots.hpp"
 
 namespace proxcgal {
@@ -66,7 +67,7 @@ TEST(Controller, TickAllocatesNothing) {
     std::vector<std::vector<Scan>> batches;
     for (std::uint32_t i = 0; i < 300; ++i) batches.push_back(scans(random, 10, i, 0.07 * i));
     std::size_t found = 0, allocations = 0;
-    constexpr int ticks = 34'000;  // 10^5 over the three
+    const int ticks = test::repeats(34'000, 334'000);  // 10^5 or 10^6 over the three
     for (int i = 0; i < ticks; ++i) {
       const std::vector<Scan> none;
       auto& batch = batches[static_cast<std::size_t>(i / 7) % batches.size()];
@@ -78,7 +79,7 @@ TEST(Controller, TickAllocatesNothing) {
       q += 0.01 * out.qd;
     }
     EXPECT_EQ(allocations, 0U);
-    EXPECT_GT(found, ticks / 2U);
+    EXPECT_GT(found, static_cast<std::size_t>(ticks) / 2U);
   }
 }
 
@@ -388,7 +389,8 @@ TEST(Controller, FromContactAndFromInsideEveryCommandLeadsOut) {
   ControllerConfig config;
   config.monitor.stuck_after = 1e9;
   int led = 0, deep = 0;
-  for (int trial = 0; trial < 300; ++trial) {
+  const int trials = test::repeats(300, 30'000);
+  for (int trial = 0; trial < trials; ++trial) {
     const JointVector q = test::posture(random, 6);
     Posture posture = robot->make_posture(), next = robot->make_posture();
     robot->update(q, posture);

@@ -5,6 +5,7 @@
 
 #include "fuzz/mesh.hpp"
 #include "fuzz/tick.hpp"
+#include "repeats.hpp"
 
 namespace proxcgal {
 namespace {
@@ -20,7 +21,8 @@ Input random_input(std::mt19937_64& engine, std::size_t least, std::size_t most)
 TEST(Fuzz, TwentyThousandRandomTicksKeepEveryPromise) {
   std::mt19937_64 engine(1);
   int ticks = 0, usable = 0, inside = 0;
-  while (ticks < 20'000) {
+  const int enough = test::repeats(20'000, 1'000'000);
+  while (ticks < enough) {
     const Input input = random_input(engine, 500, 2000);
     const fuzz::TickRun run = fuzz::run_ticks(input.data(), input.size());
     ASSERT_EQ(run.violation, "") << "after " << ticks << " ticks";

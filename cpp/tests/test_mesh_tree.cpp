@@ -3,6 +3,7 @@
 #include "meshes.hpp"
 #include "proxcgal/error.hpp"
 #include "proxcgal/geometry/mesh_tree.hpp"
+#include "repeats.hpp"
 
 namespace proxcgal {
 namespace {
@@ -17,7 +18,8 @@ MeshTree bumpy() {
 TEST(MeshTree, NearestAgreesWithCgal) {
   const MeshTree tree = bumpy();
   Random random(1);
-  for (int i = 0; i < 20000; ++i) {
+  const int queries = test::repeats(20'000, 500'000);
+  for (int i = 0; i < queries; ++i) {
     const Vector3 p = random.vector(i % 2 == 0 ? 0.3 : 2.0);
     const auto found = tree.nearest(p);
     ASSERT_TRUE(found);
@@ -47,7 +49,8 @@ TEST(MeshTree, FirstHitAgreesWithCgal) {
   const MeshTree tree = bumpy();
   Random random(3);
   int hits = 0;
-  for (int i = 0; i < 20000; ++i) {
+  const int queries = test::repeats(20'000, 500'000);
+  for (int i = 0; i < queries; ++i) {
     const Vector3 origin = random.vector(0.6);
     const Vector3 direction = (random.vector(0.2) - origin).normalized();
     const double expected = tree.reference_first_hit(origin, direction);

@@ -88,7 +88,7 @@ def campaign_command(options: CampaignOptions, command: str) -> int:
     from proxcgal.apps.origin import origin
     from proxcgal.apps.progress import announce
     from proxcgal.apps.report import write_report
-    from proxcgal.study.analysis import write_bytes, write_json
+    from proxcgal.study.analysis import write_bytes, write_json, write_text
     from proxcgal.study.figures import png
     from proxcgal.study.kind import Wishes
     from proxcgal.study.pool import Pool, default_workers
@@ -126,6 +126,8 @@ def campaign_command(options: CampaignOptions, command: str) -> int:
         }  # fmt: skip
         for name, figure in kind.figures(table).items():
             write_bytes(folder / name, png(figure))
+        for name, text in (kind.pages(summary) if kind.pages else {}).items():
+            write_text(folder / name, text)
         write_bytes(folder / "trials.parquet", parquet(table))
         write_json(folder / "run.json", origin(command) | _times(ended, begin))
         write_json(folder / "summary.json", summary)

@@ -85,7 +85,7 @@ def check_mounts(
     what the zones measured, over all scans, is fitted by a small shift and turn of each mount. A
     mount is wrong where that fit explains the measurements better than noise can (generalised
     likelihood ratio; one right mount in 10^6 is called wrong). Zones near an edge of the body, and
-    those with something else before it, are left out.
+    those with something over 60 mm before it, are left out: keep the arm free of what is nearer.
 
     A sensor that sees no body cannot be judged; nor can an error along what it sees, such as a
     shift along a flat shell. `visible` tells which directions are. An offset of a sensor's ranges
@@ -201,8 +201,9 @@ class _View:
         origins = self._T_WS[:3, 3] + moved[:, :3] @ self._T_WS[:3, :3].T
         rays = self._rays_S[zones] @ np.swapaxes(R_WS, 1, 2)
         starts = np.broadcast_to(origins[:, None, :], rays.shape)
-        found: Floats = self._body.cast(starts.reshape(-1, 3), rays.reshape(-1, 3))
-        return found.reshape(len(moved), len(zones)) * self._z_per_length[zones]
+        lengths = self._body.cast(starts.reshape(-1, 3), rays.reshape(-1, 3))
+        ranges: Floats = lengths.reshape(len(moved), len(zones)) * self._z_per_length[zones]
+        return ranges
 
 
 def rotation_by(turn: Floats) -> Floats:
@@ -303,5 +304,5 @@ def _fitted(view: _View, zones: NDArray[np.intp], ranges: Floats, sigma: Floats)
         weight = 1.0 / sigma[chosen] ** 2
         missing = ranges[chosen] - seen + slopes @ at
         information = (slopes.T * weight) @ slopes + np.diag(1.0 / _WIDE**2)
-        at = np.linalg.solve(information, slopes.T @ (weight * missing))
+        at = np.asarray(np.linalg.solve(information, slopes.T @ (weight * missing)), np.float64)
     return at

@@ -21,6 +21,7 @@ from proxcgal.study.campaign import Campaign, Trial, plain
 from proxcgal.study.fault_rows import DEGRADED, HOLD, MODES, ROWS, RUN, STOP, Fault, Row
 from proxcgal.study.figures import DPI, GREY
 from proxcgal.study.kind import Kind, Listing, Wishes
+from proxcgal.study.reliability import page
 from proxcgal.study.trials import identity, robot_of, simulate
 
 if TYPE_CHECKING:
@@ -144,7 +145,7 @@ def perform(trial: Trial, report: Report) -> Numbers:
     free = time > onset + row.duration + RECOVERY
     recovered = row.least == STOP or bool((log.mode[free] == RUN).all())
     told = not row.finding or log.findings.get(row.finding, 0) > 0
-    same = not row.same_commands or _same_commands(trial, log, report)
+    same = row.same_commands is None or _differ(trial, log, report) <= row.same_commands
     calm = not ((log.leaked_points > 0) & (log.activation > 0.0)).any()
     in_time = row.least == RUN or latency <= row.within + TICK_MS / 1000.0 + _SLACK
     right = in_time and worst <= row.most and told and recovered and same
@@ -176,10 +177,10 @@ def _refused(trial: Trial, report: Report) -> Numbers:
     }  # fmt: skip
 
 
-def _same_commands(trial: Trial, log: TrialLog, report: Report) -> bool:
-    """Are the commands those of the same trial without the fault, to the bit?"""
+def _differ(trial: Trial, log: TrialLog, report: Report) -> float:
+    """By how much commands differ at most from those of the same trial without the fault."""
     other = _simulate(trial, trial.scenario.model_copy(update={"faults": ()}), report)
-    return log.qd.tobytes() == other.qd.tobytes()
+    return float(np.abs(log.qd - other.qd).max())
 
 
 def _simulate(trial: Trial, scenario: Scenario, report: Report) -> TrialLog:
@@ -231,8 +232,8 @@ def listings(summary: Summary) -> list[Listing]:
             "number: a tick) and begins at a random "
             "moment, at a random sensor. Right: the required mode in time and no other, the "
             "finding told, the arm free again 0.5 s after the fault; where no command may change, "
-            "the same commands to the bit as without it. Latency from the fault's onset, told at "
-            "the next tick (10 ms).",
+            "the same commands as without it: to the bit, and to 1e-12 rad/s where the clock "
+            "jumps. Latency from the fault's onset, told at the next tick (10 ms).",
             names=("fault", "robot", "required", "runs", "right", "median", "worst", "bound",
                    "farthest mode"),
             units=("", "", "", "", "", "ms", "ms", "ms", "runs"),
@@ -310,11 +311,16 @@ def worst(table: pl.DataFrame) -> list[str]:
     return order["key"].to_list()
 
 
+def pages(summary: Summary) -> dict[str, str]:
+    """What docs/reliability.md is a copy of."""
+    return {"reliability.md": page(ROWS, summary, {row.name: _required(row) for row in ROWS})}
+
+
 KIND = Kind(
     title="Faults",
     introduction="A fault between the world and the controller while the arm moves: what mode "
     "follows, how soon, and whether the arm recovers. Engineering figures from a simulation, not a "
     "certificate.",
     plan=plan, analyse=analyse, listings=listings, verdicts=verdicts, figures=figures,
-    captions=captions, worst=worst,
+    captions=captions, worst=worst, pages=pages,
 )  # fmt: skip

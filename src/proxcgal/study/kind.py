@@ -53,3 +53,4 @@ class Kind:
     figures: Callable[[pl.DataFrame], dict[str, Figure]]  # by file
     captions: Callable[[Summary], dict[str, str]]  # of the same files
     worst: Callable[[pl.DataFrame], list[str]]  # keys of trials, the worst first
+    pages: Callable[[Summary], dict[str, str]] | None = None  # further text, by file

@@ -1,0 +1,230 @@
+"""docs/reliability.md, written from a campaign's summary: every row and what showed it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from proxcgal.study.fault_rows import RUN, Row
+
+_CONTROLLER = "cpp/tests/test_controller.cpp"
+_MISBEHAVIOUR = "cpp/tests/test_misbehaviour.cpp"
+_COMMAND = "cpp/tests/test_command.cpp"
+_MESH = "cpp/tests/test_mesh_tree.cpp"
+_PIPELINE = "cpp/tests/test_pipeline.cpp"
+_FUZZ = "cpp/tests/test_fuzz.cpp"
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """One thing that goes wrong, what must happen, and which tests show it."""
+
+    fault: str
+    required: str
+    tests: tuple[tuple[str, str], ...]  # file, name
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """One of the goals, with its short form and what runs the long one."""
+
+    goal: str
+    tests: tuple[tuple[str, str], ...]
+    long: str
+
+
+SHOWN: tuple[Shown, ...] = (
+    Shown("a silent sensor's sector", "at most 0.25 m/s into it, none from 0.19 s on, then HOLD",
+          ((_CONTROLLER, "MotionIntoWhatASilentSensorSawIsHeld"),)),
+    Shown("every status code and range that is none", "invalid, counted; neither contact nor free",
+          ((_PIPELINE, "OnlyTrustedZonesInRangeBecomePoints"),
+           ("tests/test_faults.py", "test_every_status_code_is_judged_as_the_table_has_it"),
+           (_CONTROLLER, "WhatNoZoneTellsIsUnknownNotFree"))),
+    Shown("duplicate, older, future and very old scans", "refused and told",
+          ((_CONTROLLER, "ARepeatedOrOlderScanIsRefused"),
+           (_CONTROLLER, "AScanOfLongAgoIsRefused"))),
+    Shown("clock jump of an hour either way", "the same commands to the bit",
+          ((_CONTROLLER, "AClockThatJumpsAnHourChangesNoCommand"),)),
+    Shown("mount 5 mm or 2 degrees wrong", "found where enough of the body is in view, in those "
+          "directions that show; the run is refused",
+          (("tests/test_mounts.py",
+            "test_5_mm_or_2_degrees_are_found_wherever_the_check_says_that_it_can"),
+           ("tests/test_mounts.py", "test_noise_alone_makes_no_mount_wrong"),
+           ("tests/test_mounts.py", "test_a_sensor_that_sees_no_body_is_not_judged"),
+           ("tests/test_mounts.py",
+            "test_the_command_refuses_with_exit_code_2_and_writes_nothing"),
+           (_MISBEHAVIOUR, "WhereMountsAreAwaitedTheArmHoldsUntilTheyAreAccepted"))),
+    Shown("cloud 100 times as large, or at a link's middle", "bounded steps; then a lower bound, "
+          "marked, DEGRADED",
+          ((_PIPELINE, "WithFewStepsTheDistanceIsALowerBoundAndMarked"),
+           (_PIPELINE, "TheCentreOfASphereTakesNoMoreThanItsSteps"))),
+    Shown("mesh with NaN, no faces, bad indices, no area, 10^7 faces", "an error with file and "
+          "face; faces without area left out and counted; the limit names itself",
+          ((_MESH, "RefusesWhatNoIndexCanBeBuiltFrom"),
+           (_MESH, "FacesWithoutAreaAreLeftOutAndCounted"),
+           ("tests/test_models_meshes.py", "huge.stl"))),
+    Shown("URDF with a cycle, two parents, orphans, no such mesh, paths outside, entities, "
+          "depth 200 000", "refused with the names, under 1 s and 256 MB",
+          (("tests/test_models_urdf.py", "test_refused_with_the_file_and_the_names"),
+           ("tests/test_models_urdf.py", "test_mesh_paths_stay_within_their_folders"),
+           ("tests/test_models_urdf.py",
+            "test_hostile_depth_and_size_are_refused_at_little_cost"))),
+    Shown("joint state not a number", "STOP within the tick, latched",
+          ((_CONTROLLER, "ANanJointStateStopsWithinOneCycleAndStaysStopped"),)),
+    Shown("joint state old", "HOLD after 20 ms, STOP after 100 ms",
+          ((_CONTROLLER, "AnOldJointStateHoldsAndAtLastStops"),)),
+    Shown("avoidance not executed inside d_min", "told; HOLD after 0.1 s",
+          ((_MISBEHAVIOUR, "AvoidanceThatIsNotExecutedInsideTheLeastDistanceHolds"),)),
+    Shown("start outside joint limits", "only inward",
+          ((_MISBEHAVIOUR, "OutsideItsLimitsAJointOnlyMovesInward"),
+           (_COMMAND, "LetsAJointOutsideItsLimitsMoveInwardsOnly"))),
+    Shown("singularity", "joint speed bounded and continuous",
+          ((_MISBEHAVIOUR, "ASingularPostureKeepsJointSpeedsBoundedAndContinuous"),)),
+    Shown("conflicting tasks", "the safety level's residual stays best, the others' are told",
+          ((_MISBEHAVIOUR,
+            "AgainstAConflictingGoalTheSafetyLevelKeepsItsBestAndBothTellWhatIsMissing"),
+           ("cpp/tests/test_solve.cpp", "TheFirstLevelKeepsItsOptimumAboveAnyOther"))),
+    Shown("obstacle at the surface, inside it, or taken for body", "kept until seen outside; every "
+          "command leads out",
+          ((_CONTROLLER, "AnObstacleThatTouchesIsNotTakenForBody"),
+           (_CONTROLLER, "FromContactAndFromInsideEveryCommandLeadsOut"),
+           (_CONTROLLER, "InsideTheLeastDistanceNothingComesNearer"))),
+    Shown("a stuck payload inside d_min", "ends with its fault",
+          ((_MISBEHAVIOUR, "AStuckPayloadDoesNotOutliveItsFaultAsAContact"),)),
+    Shown("closest point jumps between links", "acceleration limits hold; a switch at once only by "
+          "10 mm or inside d_min, else one per 100 ms",
+          ((_MISBEHAVIOUR, "CommandsStayContinuousWhereTheClosestPointJumps"),)),
+    Shown("killed while recording", "every acknowledged record is read",
+          (("tests/test_recording.py", "test_20_killed_writers_lose_no_acknowledged_tick"),)),
+    Shown("disk full", "control as it was; told at that tick",
+          (("tests/test_trial.py", "test_a_full_disk_changes_no_command_and_is_told"),
+           ("tests/test_recording.py",
+            "test_no_more_room_on_the_way_is_told_at_that_tick_and_what_was_written_is_read"))),
+    Shown("file cut or flipped anywhere", "all up to the damage is read, and where it is told",
+          (("tests/test_recording.py", "test_a_file_cut_anywhere_gives_all_ticks_before_the_cut"),
+           ("tests/test_recording.py",
+            "test_a_flipped_byte_anywhere_is_told_and_costs_nothing_before_it"))),
+    Shown("simulator warns or diverges", "the run fails",
+          (("tests/test_world.py", "test_a_warning_of_mujoco_fails_the_run"),
+           ("tests/test_world.py", "test_an_arm_without_finite_pose_is_an_error"))),
+    Shown("hostile bytes in any input", "errors with a name only; no command outside the limits",
+          ((_FUZZ, "TwentyThousandRandomTicksKeepEveryPromise"),
+           ("tests/test_fuzz.py", "test_broken_files_raise_errors_of_ours_only"))),
+)  # fmt: skip
+
+_LONG_CPP = "`./run test --long`"
+GOALS: tuple[Goal, ...] = (
+    Goal("1. 10^6 fuzzed frames", ((_FUZZ, "TwentyThousandRandomTicksKeepEveryPromise"),),
+         f"{_LONG_CPP}; `./run fuzz MINUTES tick`"),
+    Goal("2. every row, 200 seeds, two robots",
+         (("tests/test_faults.py", "test_the_mode_is_right_in_time_and_the_arm_recovers"),),
+         "`proxcgal campaign faults --runs 200`"),
+    Goal("3. no allocation in 10^6 ticks; p99.9; adversarial clouds",
+         ((_CONTROLLER, "TickAllocatesNothing"),), f"{_LONG_CPP}; `./run bench`"),
+    Goal("4. solver against an independent one, 10^5 stacks",
+         (("tests/test_solve.py", "test_agrees_with_the_formulas_on_random_stacks"),), _LONG_CPP),
+    Goal("5. 10^6 point and ray queries", ((_MESH, "NearestAgreesWithCgal"),
+                                           (_MESH, "FirstHitAgreesWithCgal")), _LONG_CPP),
+    Goal("6. 1000 kills; a log cut at every byte",
+         (("tests/test_recording.py", "test_20_killed_writers_lose_no_acknowledged_tick"),
+          ("tests/test_recording.py", "test_a_file_cut_anywhere_gives_all_ticks_before_the_cut")),
+         _LONG_CPP),
+    Goal("7. replays bit-identical",
+         (("tests/test_trial.py",
+           "test_a_replay_gives_every_recorded_answer_again_bit_for_bit"),), _LONG_CPP),
+    Goal("8. ASan, UBSan, TSan clean, with and without NDEBUG",
+         ((_FUZZ, "TwentyThousandRandomTicksKeepEveryPromise"),),
+         "`./run check --asan`, `--ubsan`, `--tsan`; CI: `./run check --asan-ubsan --short`"),
+    Goal("9. outward recovery", ((_CONTROLLER, "FromContactAndFromInsideEveryCommandLeadsOut"),),
+         _LONG_CPP),
+)  # fmt: skip
+
+_HEAD = """\
+# Reliability: what goes wrong, what happens then, and how it was shown
+
+These are engineering figures from tests and simulation, not a certificate: no performance level and
+no SIL is claimed anywhere.
+
+Modes: RUN, DEGRADED (slower), HOLD (brakes within limits and stays), STOP (latched until a
+deliberate reset). What is not seen is unknown, never free. Findings and their modes:
+[conventions.md](conventions.md#findings). `proxcgal campaign faults` writes this page into its
+folder, with the figures of that campaign.
+
+## Faults in running trials
+
+Every fault is put in while the arm moves among panel, walls and cabinet, at a random moment and a
+random sensor; the `[[fault]]` tables of [scenarios.md](scenarios.md#fault) do the same in any
+scenario. A run is right when the required mode comes in time and no farther one, the finding is
+told, the arm is free again half a second after the fault, and, where no command may change, the
+commands are those of the run without the fault: to the bit, and to 1e-12 rad/s where the clock
+jumps, as an hour added to a stamp costs it 4.5e-13 s of its resolution. Latency is from the fault's
+onset, told at the next tick: it may pass its bound by a tick of 10 ms.
+"""
+
+
+def page(rows: tuple[Row, ...], summary: dict[str, Any], required: dict[str, str]) -> str:
+    """The whole page.
+
+    Args:
+        rows: of the campaign, in order.
+        summary: of a faults campaign.
+        required: mode that each row asks for, by name.
+    """
+    robots = summary["robots"]
+    lines = [_HEAD]
+    runs = sum(found["runs"] for own in robots.values() for found in own.values())
+    lines.append(
+        f"{summary['right']} of {runs} runs were right: "
+        + "; ".join(f"{len(own)} rows on {robot}" for robot, own in robots.items())
+        + f", seeds from {summary.get('seed', 0)} on, {summary.get('runs', '?')} runs a row.\n"
+    )
+    lines.append(
+        "| fault | required | bound ms | robot | right | median ms | worst ms | farthest |"
+    )
+    lines.append("|---|---|---|---|---|---|---|---|")
+    for row in rows:
+        bound = f"{1000 * row.within:.0f}" if row.least > RUN and not row.refused else "-"
+        for robot, own in robots.items():
+            if row.name not in own:
+                continue
+            found = own[row.name]
+            modes = ", ".join(f"{mode} {n}" for mode, n in found["worst_modes"].items())
+            lines.append(
+                f"| {row.name} | {required[row.name]} | {bound} | {robot} | {found['right']} of "
+                f"{found['runs']} | {_ms(found['latency_median_ms'])} | "
+                f"{_ms(found['latency_max_ms'])} | {modes} |"
+            )
+    lines += ["", _LIMITS, "## Shown by tests", "", "| what goes wrong | what happens | shown by |"]
+    lines.append("|---|---|---|")
+    lines += [f"| {s.fault} | {s.required} | {_tests(s.tests)} |" for s in SHOWN]
+    lines += [
+        "",
+        "## Goals",
+        "",
+        "| goal | short form, in the tests | long form |",
+        "|---|---|---|",
+    ]
+    lines += [f"| {g.goal} | {_tests(g.tests)} | {g.long} |" for g in GOALS]
+    return "\n".join(lines) + "\n" + _END
+
+
+_LIMITS = """\
+A mount can be judged only by a sensor that sees enough of the arm, and only in directions that
+change what it sees: a shift along a flat shell shows nothing. The rows above hit sensors and
+directions that the check itself calls visible at the scene's start; on the UR10e's forearm rings
+that is 4 or 5 of 30 sensors. An offset of a sensor's ranges counts as a shift along its view, and
+what is held within 60 mm before the body may be taken for a wrong mount.
+"""
+_END = """
+Not here: goals of the 12-joint server that are preempted or cancelled, and hostile clients of the
+live page and the server. What the long forms gave: [benchmarks.md](benchmarks.md) and the
+changelog.
+"""
+
+
+def _tests(tests: tuple[tuple[str, str], ...]) -> str:
+    return ", ".join(f"`{file}` {name}" for file, name in tests)
+
+
+def _ms(value: float | None) -> str:
+    return "-" if value is None else f"{value:.0f}"
