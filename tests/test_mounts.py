@@ -90,6 +90,12 @@ def test_something_before_the_body_makes_no_mount_wrong(setup: Setup) -> None:
     assert sum(c.zones for c in near.sensors) < sum(c.zones for c in looked(setup).sensors)
 
 
+def test_a_sensor_that_looks_elsewhere_altogether_is_wrong() -> None:
+    setup = Setup.of(load_scenario("timing_ur10e", ["vertices_per_link=1000", "obstacle=[]"]))
+    away = Fault.model_validate({"kind": "mount_turn", "sensor": 28, "axis": "y", "value": 2.5})
+    assert 28 in [check.sensor for check in looked(setup, (away,)).wrong]
+
+
 def test_scans_of_another_skin_are_refused(setup: Setup) -> None:
     scan = px.Scan(99, 0, 0.0, np.full(64, 0.5), np.full(64, 5, np.uint8))
     with pytest.raises(px.ConfigError, match="scan of sensor 99: the skin has 0 to 29"):

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from proxcgal import _core
 from proxcgal.errors import ConfigError
 from proxcgal.models.robots import Robot
+from proxcgal.models.self_view import Body, View
 from proxcgal.models.triangles import Floats
 
 #: Wrong by this much a mount must be found, where its sensor sees enough of the body.
@@ -28,6 +29,7 @@ _GATE = 0.06  # [m] what measures farther from the prediction is another thing
 THRESHOLD = 38.2583
 _SURE = 3.0902  # sigmas that miss one error in 1000 that counts as visible
 _MIN_SCANS = 3  # that must tell of a zone
+_EMPTY = 0.8  # share of scans without a target that leaves a zone empty
 _MIN_ZONES = 4  # less is no view
 _MIN_GAPS = 4  # zones that look through where the body must be
 _ROUNDS = 3  # of the fit, so that its size is that of the error
@@ -106,7 +108,7 @@ def check_mounts(
     Source: [WA] Algorithm 1 for the prediction; the test is ours (docs/sources.md).
     """
     ranges, sigma = _measured(skin, scans)
-    body = _Body(robot, np.asarray(robot.link_poses(q)))
+    body = Body(robot, np.asarray(robot.link_poses(q)))
     checks = []
     for row, mount in enumerate(skin.mounts):
         if mount.link not in robot.link_names:
@@ -117,16 +119,18 @@ def check_mounts(
         T_WS = body.poses_W[robot.link_names.index(mount.link)] @ np.asarray(mount.T_LS)
         checks.append(
             _check(
-                row, mount.name, _View(body, skin.model, T_WS), skin.model, ranges[row], sigma[row]
+                row, mount.name, View(body, skin.model, T_WS), skin.model, ranges[row], sigma[row]
             )
         )
     return MountChecks(sensors=tuple(checks))
 
 
 def _measured(skin: _core.Skin, scans: Iterable[_core.Scan]) -> tuple[Floats, Floats]:
-    """Mean range along z of each sensor's zones, (n, 64), nan where too few tell; its sigma."""
-    total = np.zeros((len(skin), 64))
-    count = np.zeros((len(skin), 64))
+    """Mean range along z of each sensor's zones, (n, 64), and its sigma.
+
+    The range is nan where too few scans tell, inf where they say that nothing is there.
+    """
+    total, count, empty, scanned = np.zeros((4, len(skin), 64))
     for scan in scans:
         if not 0 <= scan.sensor < len(skin):
             raise ConfigError(f"scan of sensor {scan.sensor}: the skin has 0 to {len(skin) - 1}")
@@ -135,90 +139,18 @@ def _measured(skin: _core.Skin, scans: Iterable[_core.Scan]) -> tuple[Floats, Fl
         told = (status == 5) & (ranges >= skin.model.min_range) & (ranges <= skin.model.max_range)
         total[scan.sensor] += np.where(told, ranges, 0.0)
         count[scan.sensor] += told
+        empty[scan.sensor] += status == 255
+        scanned[scan.sensor] += 1
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = np.where(count >= _MIN_SCANS, total / count, np.nan)
         noise = np.maximum(skin.model.sigma_floor, skin.model.sigma_ratio * mean)
-        return mean, np.hypot(noise / np.sqrt(count), _SURFACE)
-
-
-class _Body:
-    """The links' full surfaces at one posture."""
-
-    def __init__(self, robot: Robot, poses_W: Floats) -> None:
-        self.poses_W = poses_W
-        self._trees = _trees(robot)
-        boxes = [
-            (np.asarray(t.vertices_L).min(0), np.asarray(t.vertices_L).max(0)) for t in self._trees
-        ]
-        self._centres = np.array([(low + high) / 2 for low, high in boxes])
-        self._radii = np.array([np.linalg.norm(high - low) / 2 for low, high in boxes])
-
-    def cast(self, origins_W: Floats, rays_W: Floats) -> Floats:
-        """(n,) length to the first surface, past the sensor's own mounting; inf for none."""
-        length = np.full(len(origins_W), np.inf)
-        start = origins_W + _MOUNTING * rays_W
-        for tree, T_WL, centre, radius in zip(
-            self._trees, self.poses_W, self._centres, self._radii, strict=True
-        ):
-            to_centre = T_WL[:3, :3] @ centre + T_WL[:3, 3] - start
-            along = np.einsum("ij,ij->i", to_centre, rays_W)
-            off = np.einsum("ij,ij->i", to_centre, to_centre) - np.maximum(along, 0.0) ** 2
-            near = np.flatnonzero(off <= radius**2)
-            if near.size:
-                origins_L = (start[near] - T_WL[:3, 3]) @ T_WL[:3, :3]
-                hit = np.asarray(tree.first_hit(origins_L, rays_W[near] @ T_WL[:3, :3]))
-                length[near] = np.minimum(length[near], hit)
-        return length + _MOUNTING
-
-
-_MOUNTING = 0.005  # [m] of each ray, as `filter.min_hit`
-_known: dict[str, list[_core.MeshTree]] = {}
-
-
-def _trees(robot: Robot) -> list[_core.MeshTree]:
-    """Full surfaces, of the robot that was asked last."""
-    if robot.digest not in _known:
-        _known.clear()
-        _known[robot.digest] = [_core.MeshTree(*robot.full_mesh(n)) for n in robot.link_names]
-    return _known[robot.digest]
-
-
-class _View:
-    """What one sensor must see from a mount moved by a little, as ranges along its z."""
-
-    def __init__(self, body: _Body, model: _core.SensorModel, T_WS: Floats) -> None:
-        self._body = body
-        rays = np.asarray(_core.zone_directions(model))
-        length = np.linalg.norm(rays, axis=1)
-        self._rays_S = rays / length[:, None]
-        self._z_per_length = 1.0 / length
-        self._T_WS = T_WS
-
-    def __call__(self, moved: Floats, zones: NDArray[np.intp]) -> Floats:
-        """Ranges (k, len(zones)) from mounts moved by (k, 6): shift [m], turn [rad], in S."""
-        turns = np.array([rotation_by(turn) for turn in moved[:, 3:]])
-        R_WS = self._T_WS[:3, :3] @ turns
-        origins = self._T_WS[:3, 3] + moved[:, :3] @ self._T_WS[:3, :3].T
-        rays = self._rays_S[zones] @ np.swapaxes(R_WS, 1, 2)
-        starts = np.broadcast_to(origins[:, None, :], rays.shape)
-        lengths = self._body.cast(starts.reshape(-1, 3), rays.reshape(-1, 3))
-        ranges: Floats = lengths.reshape(len(moved), len(zones)) * self._z_per_length[zones]
-        return ranges
-
-
-def rotation_by(turn: Floats) -> Floats:
-    """(3, 3) of a rotation vector [rad]."""
-    angle = float(np.linalg.norm(turn))
-    if angle == 0.0:
-        return np.eye(3)
-    x, y, z = turn / angle
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    rotation: Floats = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
-    return rotation
+        sigma = np.hypot(noise / np.sqrt(count), _SURFACE)
+    nothing = (scanned >= _MIN_SCANS) & (empty >= _EMPTY * scanned)
+    return np.where(nothing, np.inf, mean), np.where(nothing, 1.0, sigma)
 
 
 def _check(
-    row: int, name: str, view: _View, model: _core.SensorModel, ranges: Floats, sigma: Floats
+    row: int, name: str, view: View, model: _core.SensorModel, ranges: Floats, sigma: Floats
 ) -> MountCheck:
     zones, predicted, slopes = _smooth(view, np.zeros(6), np.arange(64))
     noise = np.maximum(model.sigma_floor, model.sigma_ratio * predicted)
@@ -262,7 +194,7 @@ class _Expected:
         return float(towards @ np.linalg.solve(information, towards)), self.zones[usable], gaps
 
 
-def _visible(view: _View, seen: _Expected) -> tuple[str, ...]:
+def _visible(view: View, seen: _Expected) -> tuple[str, ...]:
     """Axes along and about which an error of either sign would be found."""
     sizes = np.diag([SHIFT_M] * 3 + [TURN_RAD] * 3)
     if seen.zones.size < _MIN_ZONES:
@@ -276,7 +208,7 @@ def _visible(view: _View, seen: _Expected) -> tuple[str, ...]:
 
 
 def _smooth(
-    view: _View, at: Floats, zones: NDArray[np.intp]
+    view: View, at: Floats, zones: NDArray[np.intp]
 ) -> tuple[NDArray[np.intp], Floats, Floats]:
     """Zones that see one smooth piece of the body; their ranges; how these move with the mount."""
     seen = view(at[None], zones)[0]
@@ -294,7 +226,7 @@ def _smooth(
     return zones[smooth], seen[smooth], slopes[smooth]
 
 
-def _fitted(view: _View, zones: NDArray[np.intp], ranges: Floats, sigma: Floats) -> Floats:
+def _fitted(view: View, zones: NDArray[np.intp], ranges: Floats, sigma: Floats) -> Floats:
     """Where the mount must be for what was seen, as near to where it should be as that allows."""
     at: Floats = np.zeros(6)
     for _ in range(_ROUNDS):

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from proxcgal import _core
 from proxcgal.errors import ConfigError
-from proxcgal.models.mounts import MountChecks, check_mounts, rotation_by
+from proxcgal.models.mounts import MountChecks, check_mounts
+from proxcgal.models.self_view import rotation_by
 from proxcgal.sim.faults import rows_of, value_of
 from proxcgal.sim.scenario_keys import MOUNT_FAULTS, Fault
 
