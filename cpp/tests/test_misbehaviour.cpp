@@ -125,8 +125,8 @@ TEST(Misbehaviour, CommandsStayContinuousWhereTheClosestPointJumps) {
                 .distance;
         // At once only inside d_min, where the new link is nearer by 10 mm, or where the old one
         // cannot be moved away any more.
-        EXPECT_TRUE(inside || found(controller, Reason::kLinkSkipped) || other >= out.pair->distance + 0.01 - 1e-9 ||
-                    time - switched >= 0.1 - 1e-9)
+        EXPECT_TRUE(inside || found(controller, Reason::kLinkSkipped) ||
+                    other >= out.pair->distance + 0.01 - 1e-9 || time - switched >= 0.1 - 1e-9)
             << "after " << time - switched << " s";
         switched = time;
       }

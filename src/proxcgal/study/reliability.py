@@ -131,7 +131,7 @@ GOALS: tuple[Goal, ...] = (
          (("tests/test_recording.py", "test_20_killed_writers_lose_no_acknowledged_tick"),
           ("tests/test_recording.py", "test_a_file_cut_anywhere_gives_all_ticks_before_the_cut")),
          _LONG_CPP,
-         "1000 kills: no acknowledged tick lost", "1000 kills: no acknowledged tick lost"),
+         "1000 kills: no acknowledged tick lost"),
     Goal("7. replays bit-identical",
          (("tests/test_trial.py",
            "test_a_replay_gives_every_recorded_answer_again_bit_for_bit"),), _LONG_CPP),
