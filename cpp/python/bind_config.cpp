@@ -101,6 +101,43 @@ void bind_config(nanobind::module_& m) {
               "[s] of avoidance not executed inside d_min, before HOLD.")
       .def_ro("await_mounts", &MonitorConfig::await_mounts,
               "HOLD until Controller.accept_mounts() says that the mounts were checked.");
+  nb::class_<MemoryConfig>(m, "MemoryConfig",
+                           "What is remembered of what left the sensors' view; ours, not [WA]'s.")
+      .def(
+          "__init__",
+          [](MemoryConfig* self, double memory_s, double voxel, int max_points, int clear_scans) {
+            const MemoryConfig config{memory_s, voxel, max_points, clear_scans};
+            config.validate();
+            new (self) MemoryConfig(config);
+          },
+          nb::kw_only(), "memory_s"_a = MemoryConfig{}.memory_s, "voxel"_a = MemoryConfig{}.voxel,
+          "max_points"_a = MemoryConfig{}.max_points, "clear_scans"_a = MemoryConfig{}.clear_scans)
+      .def_ro("memory_s", &MemoryConfig::memory_s,
+              "[s] age at which a point is forgotten in any case; 0: none is kept.")
+      .def_ro("voxel", &MemoryConfig::voxel, "[m] edge; each holds one point, the newest.")
+      .def_ro("max_points", &MemoryConfig::max_points,
+              "Beyond, those farthest from the arm are forgotten.")
+      .def_ro("clear_scans", &MemoryConfig::clear_scans,
+              "Scans that must see through a point before it counts as gone.");
+  nb::class_<MotionConfig>(
+      m, "MotionConfig",
+      "How the closest obstacle's velocity is estimated, the x_o of [WA] eq. (4); ours.")
+      .def(
+          "__init__",
+          [](MotionConfig* self, double window, double radius, double confidence,
+             double max_speed) {
+            const MotionConfig config{window, radius, confidence, max_speed};
+            config.validate();
+            new (self) MotionConfig(config);
+          },
+          nb::kw_only(), "window"_a = MotionConfig{}.window, "radius"_a = MotionConfig{}.radius,
+          "confidence"_a = MotionConfig{}.confidence, "max_speed"_a = MotionConfig{}.max_speed)
+      .def_ro("window", &MotionConfig::window, "[s] scans that old count.")
+      .def_ro("radius", &MotionConfig::radius,
+              "[m] of the patch of surface round the closest point.")
+      .def_ro("confidence", &MotionConfig::confidence,
+              "Standard deviations below which a velocity is taken for none.")
+      .def_ro("max_speed", &MotionConfig::max_speed, "[m/s] the estimate is shortened to it.");
   nb::class_<ControllerConfig>(
       m, "ControllerConfig",
       "Everything the controller is set up with; `tasks` in order of priority.")
@@ -110,7 +147,8 @@ void bind_config(nanobind::module_& m) {
              const std::optional<std::vector<TaskSpec>>& tasks, const FilterConfig& filter,
              const SolverConfig& solver, const MonitorConfig& monitor, double period,
              double min_row_norm, std::vector<std::string> avoid_links, const std::string& method,
-             int max_points, bool timings) {
+             int max_points, bool timings, std::optional<MemoryConfig> memory,
+             std::optional<MotionConfig> motion) {
             const ControllerConfig config{choice(control_point, "control_point", kControlPoints),
                                           tasks ? *tasks : ControllerConfig{}.tasks,
                                           filter,
@@ -121,7 +159,9 @@ void bind_config(nanobind::module_& m) {
                                           std::move(avoid_links),
                                           choice(method, "method", kMethods),
                                           max_points,
-                                          timings};
+                                          timings,
+                                          memory,
+                                          motion};
             config.validate();
             new (self) ControllerConfig(config);
           },
@@ -130,7 +170,8 @@ void bind_config(nanobind::module_& m) {
           "period"_a = ControllerConfig{}.period,
           "min_row_norm"_a = ControllerConfig{}.min_row_norm,
           "avoid_links"_a = std::vector<std::string>{}, "method"_a = "fast",
-          "max_points"_a = ControllerConfig{}.max_points, "timings"_a = false)
+          "max_points"_a = ControllerConfig{}.max_points, "timings"_a = false,
+          "memory"_a = nb::none(), "motion"_a = nb::none())
       .def_prop_ro(
           "control_point",
           [](const ControllerConfig& c) { return choice_name(c.control_point, kControlPoints); },
@@ -148,5 +189,9 @@ void bind_config(nanobind::module_& m) {
                    [](const ControllerConfig& c) { return choice_name(c.method, kMethods); })
       .def_ro("max_points", &ControllerConfig::max_points,
               "The most known points that a tick takes.")
-      .def_ro("timings", &ControllerConfig::timings);
+      .def_ro("timings", &ControllerConfig::timings)
+      .def_ro("memory", &ControllerConfig::memory,
+              "Of what left the sensors' view; None: as in the paper.")
+      .def_ro("motion", &ControllerConfig::motion,
+              "x_o of eq. (4) from the scans; None: taken for zero.");
 }

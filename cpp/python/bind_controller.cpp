@@ -33,6 +33,9 @@ struct Output {
   Eigen::VectorXd qd;
   std::optional<NamedPair> pair;
   PointOrigin origin;
+  double pair_age = 0.0;
+  bool pair_remembered = false;
+  Vector3 obstacle_velocity_W = Vector3::Zero();
   std::optional<Vector3> control_W;
   double control_distance = kInfinity;
   std::string control_link;
@@ -70,6 +73,9 @@ Output kept(const Controller& controller, const TickOutput& out) {
   copy.qd = out.qd;
   if (out.pair) copy.pair = named(robot, *out.pair);
   copy.origin = out.pair_origin;
+  copy.pair_age = out.pair_age;
+  copy.pair_remembered = out.pair_remembered;
+  copy.obstacle_velocity_W = out.obstacle_velocity_W;
   if (out.control.link >= 0) copy.control_W = out.control.control_W;
   copy.control_distance = out.control.distance;
   copy.control_link = link_name(robot, out.control.link);
@@ -83,11 +89,9 @@ Output kept(const Controller& controller, const TickOutput& out) {
     copy.tasks.push_back({task.name, task.rate, task.activation, task.residual});
   }
   if (controller.config().timings) {
-    copy.timings = {{"sense_us", out.timings.sense_us},
-                    {"filter_us", out.timings.filter_us},
-                    {"distance_us", out.timings.distance_us},
-                    {"solve_us", out.timings.solve_us},
-                    {"total_us", out.timings.total_us}};
+    copy.timings = {{"sense_us", out.timings.sense_us},   {"filter_us", out.timings.filter_us},
+                    {"memory_us", out.timings.memory_us}, {"distance_us", out.timings.distance_us},
+                    {"solve_us", out.timings.solve_us},   {"total_us", out.timings.total_us}};
   }
   return copy;
 }
@@ -234,6 +238,10 @@ void bind_output(nb::module_& m) {
           "Sensor that saw the pair's obstacle point, -1 for none.")
       .def_prop_ro(
           "pair_zone", [](const Output& o) { return o.origin.zone; }, "Its zone, -1 for none.")
+      .def_ro("pair_age", &Output::pair_age, "[s] since that point was measured, 0 for none.")
+      .def_ro("pair_remembered", &Output::pair_remembered, "No current scan shows it any more.")
+      .def_ro("obstacle_velocity_W", &Output::obstacle_velocity_W,
+              "(3,) of the pair's obstacle [m/s], as estimated (`tick`) or given (`tick_known`).")
       .def_ro("control_W", &Output::control_W,
               "(3,) point of the robot that avoidance moves, or None [m].")
       .def_ro("control_distance", &Output::control_distance,
@@ -288,7 +296,13 @@ void bind_controller(nanobind::module_& m) {
            "until `reset`.")
       .def(
           "cloud_W", [](const Controller& c) { return Points(c.cloud_W()); },
-          "(n, 3) filtered cloud of the last tick, in world [m].")
+          "(n, 3) filtered cloud of the last tick, in world [m]: what the last scans show, then "
+          "what is "
+          "remembered.")
+      .def_prop_ro("seen_points", &Controller::seen_points,
+                   "Rows of `cloud_W` that the last scans show.")
+      .def("cloud_ages", &Controller::cloud_ages, "time"_a,
+           "[s] since each row of `cloud_W` was measured.")
       .def(
           "cloud_origins",
           [](const Controller& c) {

@@ -97,7 +97,10 @@ void Caution::watch(double time, const TickOutput& out, Perception& perception) 
       out.pair && out.pair_origin.sensor >= 0 &&
       perception.freshness().suspect(static_cast<std::size_t>(out.pair_origin.sensor));
   if (!inside(out) || doubtful) near_since_ = time;
-  if (time - near_since_ > kBelieved) {
+  const bool believed = time - near_since_ > kBelieved;
+  perception.hold(believed && out.pair_remembered ? out.pair->point : -1);
+  // No zone shows what is remembered: there is none to watch.
+  if (believed && !out.pair_remembered) {
     perception.watch({out.pair_origin, out.pair->obstacle_W});
   } else {
     perception.watch({});

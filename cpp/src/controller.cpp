@@ -45,6 +45,8 @@ struct Controller::Impl {
 
   JointVector qd_last;
   Posture posture;
+  const Points none_W = Points(0, 3);
+  Points estimate_W = Points::Zero(1, 3);  // velocity of the closest obstacle [m/s]
   std::array<BuiltTask, kMaxLevels> built;
   std::array<Task, kMaxLevels> stack;
   Solution solution;
@@ -188,7 +190,6 @@ struct Controller::Impl {
   void act(const JointVector& q, const PointsRef& cloud_W, bool sensed,
            const detail::Velocities& velocities, const Pose& goal) {
     detail::Stopwatch watch(config.timings);
-    robot->update(q, posture);
     out.pair = control_points.nearest(clock.now(), *robot, posture, cloud_W, caution.d_min(),
                                       engaged_within(), monitor);
     if (sensed) {
@@ -196,7 +197,17 @@ struct Controller::Impl {
     } else {
       caution.trust_known(posture, out);
     }
-    build_stack(cloud_W, velocities, goal);
+    if (out.pair) out.obstacle_velocity_W = velocities.of(out.pair->point);
+    if (out.pair && sensed && config.motion) {
+      const Vector3& obstacle_W = out.pair->obstacle_W;
+      out.obstacle_velocity_W = perception.velocity_W(clock.now(), obstacle_W);
+      estimate_W.row(0) = out.obstacle_velocity_W.transpose();
+      const PointsRef moving_W(estimate_W);
+      const detail::Velocities estimated(moving_W, cloud_W, obstacle_W, config.motion->radius);
+      build_stack(cloud_W, estimated, goal);
+    } else {
+      build_stack(cloud_W, velocities, goal);
+    }
     out.timings.distance_us = watch.lap_us();
     const std::span<const Task> tasks(stack.data(), config.tasks.size());
     solve(tasks, robot->n_q(), limits.qd_max, config.solver, solution);
@@ -212,6 +223,15 @@ struct Controller::Impl {
     judge();
     if ((q.array() < limits.q_min.array() || q.array() > limits.q_max.array()).any())
       note(Reason::kOutsideLimits);
+  }
+
+  /// Who saw the pair's obstacle point, and when.
+  void blame() {
+    if (!out.pair) return;
+    const Eigen::Index row = out.pair->point;
+    out.pair_origin = perception.origins()[static_cast<std::size_t>(row)];
+    out.pair_age = clock.now() - perception.stamp(row);
+    out.pair_remembered = row >= perception.seen_points();
   }
 
   /// The mode that this tick's findings call for; HOLD and STOP brake instead of what was solved.
@@ -234,6 +254,9 @@ struct Controller::Impl {
     if (!clock.advance(time)) note(Reason::kTimeInvalid);
     out.pair.reset();
     out.pair_origin = {};
+    out.pair_age = 0.0;
+    out.pair_remembered = false;
+    out.obstacle_velocity_W.setZero();
     out.trusted_distance = kInfinity;
     out.control = {};
     out.timings = {};
@@ -260,9 +283,11 @@ const TickOutput& Controller::tick(double time, const JointVector& q, std::span<
     me.out.timings.sense_us = me.perception.sense_us;
     me.out.timings.filter_us = me.perception.filter_us;
     me.perception.freshness().check(me.clock.now(), me.monitor);
-    me.act(q, me.perception.cloud_W(), true, detail::Velocities(Points(0, 3)), goal);
-    if (me.out.pair)
-      me.out.pair_origin = me.perception.origins()[static_cast<std::size_t>(me.out.pair->point)];
+    me.robot->update(q, me.posture);
+    me.perception.remember(me.clock.now(), me.posture);
+    me.out.timings.memory_us = me.perception.memory_us;
+    me.act(q, me.perception.cloud_W(), true, detail::Velocities(me.none_W), goal);
+    me.blame();
     me.caution.watch(me.clock.now(), me.out, me.perception);
   }
   me.conclude(q, usable);
@@ -284,6 +309,7 @@ const TickOutput& Controller::tick_known(double time, const JointVector& q,
     me.note(Reason::kPointsInvalid);
     usable = false;
   }
+  if (usable) me.robot->update(q, me.posture);
   if (usable) me.act(q, points_W, false, detail::Velocities(velocities_W), goal);
   me.conclude(q, usable);
   me.out.timings.total_us = watch.lap_us();
@@ -296,6 +322,14 @@ std::span<const PointOrigin> Controller::cloud_origins() const {
   return impl_->perception.origins();
 }
 Eigen::Map<const Points> Controller::raw_cloud_W() const { return impl_->perception.raw_cloud_W(); }
+Eigen::Index Controller::seen_points() const { return impl_->perception.seen_points(); }
+std::vector<double> Controller::cloud_ages(double time) const {
+  std::vector<double> ages(impl_->perception.origins().size());
+  const double now = time + impl_->clock.delay();
+  for (std::size_t row = 0; row < ages.size(); ++row)
+    ages[row] = now - impl_->perception.stamp(static_cast<Eigen::Index>(row));
+  return ages;
+}
 std::vector<double> Controller::scan_ages(double time) const {
   std::vector<double> ages(impl_->skin.mounts.size());
   const double now = time + impl_->clock.delay();

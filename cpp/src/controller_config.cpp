@@ -21,6 +21,8 @@ void ControllerConfig::validate() const {
   filter.validate();
   solver.validate();
   monitor.validate();
+  if (memory) memory->validate();
+  if (motion) motion->validate();
   require(period > 0.0 && period <= 0.5, "period", period, "above 0 and at most 0.5 s");
   require(min_row_norm >= 0.0 && min_row_norm < 1.0, "min_row_norm", min_row_norm,
           "at least 0 and below 1");

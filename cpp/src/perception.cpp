@@ -38,17 +38,28 @@ Perception::Perception(std::shared_ptr<const Robot> robot, const Skin& skin,
   staged_.tolerance.resize(room);
   staged_.range.resize(room);
   staged_.keep = std::make_unique<bool[]>(room);
-  for (Points* points : {&staged_.origins_W, &staged_.points_W, &cloud_, &raw_}) {
+  for (Points* points : {&staged_.origins_W, &staged_.points_W, &raw_}) {
     points->setZero(static_cast<Eigen::Index>(room), 3);
   }
-  origins_.resize(room);
+  std::size_t remembered = 0;
+  if (config.memory && config.memory->memory_s > 0.0) {
+    const SensorModel& model = skin.model;
+    const ViewModel view{model.field_of_view, model.sigma_floor, model.sigma_ratio, config_.sigmas};
+    memory_.emplace(*config.memory, view, sensors_.size());
+    remembered = static_cast<std::size_t>(config.memory->max_points);
+    body_ = std::make_unique<bool[]>(remembered);
+  }
+  if (config.motion) motion_.emplace(*config.motion, sensors_.size());
+  cloud_.setZero(static_cast<Eigen::Index>(room + remembered), 3);
+  origins_.resize(room + remembered);
+  stamps_.resize(room + remembered);
 }
 
 void Perception::update(double time, double delay, const JointVector& q,
                         std::span<const Scan> scans, Monitor& monitor) {
   history_.push(time, q);
   steps_ = kSearchSteps;
-  sense_us = filter_us = 0.0;
+  sense_us = filter_us = memory_us = 0.0;
   if (scans.empty()) return;
   double placed = std::numeric_limits<double>::quiet_NaN();  // stamp that `posture_` is at
   staged_.count = 0;
@@ -63,16 +74,20 @@ void Perception::update(double time, double delay, const JointVector& q,
       placed = scan.stamp;
       robot_->update(history_.at(scan.stamp + delay), posture_);
     }
-    stage(time, scan, monitor);
+    let_go(static_cast<std::size_t>(scan.sensor));
+    stage(time, scan, scan.stamp + delay, monitor);
     sense_us += watch.lap_us();
   }
   Stopwatch watch(timings);
   filter(monitor);
+  filter_us += watch.lap_us();
+  for (std::size_t id = 0; (memory_ || motion_) && id < sensors_.size(); ++id) let_go(id);
+  memory_us += watch.lap_us();
   gather();
   filter_us += watch.lap_us();
 }
 
-void Perception::stage(double time, const Scan& scan, Monitor& monitor) {
+void Perception::stage(double time, const Scan& scan, double stamp, Monitor& monitor) {
   SensedPoints sensed;
   sense_(scan, sensed);
   Sensor& sensor = sensors_[static_cast<std::size_t>(scan.sensor)];
@@ -88,6 +103,8 @@ void Perception::stage(double time, const Scan& scan, Monitor& monitor) {
   if (!usable) return;
   const Eigen::Index before = staged_.count;
   const Pose T_WS = posture_.T_WL[static_cast<std::size_t>(sensor.link)] * sensor.T_LS;
+  if (memory_ || motion_) look(scan, stamp, T_WS, sensor);
+  sensor.stamp = stamp;
   sensor.n_raw = sensor.n_kept = 0;
   if (config_.confirmation != Confirmation::kOff) {
     std::rotate(sensor.past.begin(), sensor.past.end() - 1, sensor.past.end());
@@ -161,7 +178,84 @@ void Perception::keep(Sensor& sensor, int begin, int end) {
     const auto at = static_cast<std::size_t>(sensor.n_kept++);
     sensor.kept_W[at] = staged_.points_W.row(i).transpose();
     sensor.zone[at] = static_cast<std::uint8_t>(zone);
+    sensor.tolerance[at] = staged_.tolerance[row];
+    sensor.view.obstacle[static_cast<std::size_t>(zone)] =
+        sensor.view.empty_to[static_cast<std::size_t>(zone)];
   }
+}
+
+/// What the scan says of the space before its sensor, and what of its last scan is to leave.
+void Perception::look(const Scan& scan, double stamp, const Pose& T_WS, Sensor& sensor) {
+  sensor.leaves = true;
+  sensor.n_left = sensor.n_kept;
+  for (int i = 0; i < sensor.n_kept; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    sensor.left[at] = {
+        sensor.kept_W[at], sensor.stamp, sensor.tolerance[at], {scan.sensor, sensor.zone[at]}};
+  }
+  sensor.view.T_WS = T_WS;
+  sensor.view.stamp = stamp;
+  sensor.view.obstacle.fill(0.0F);
+  for (int zone = 0; zone < kZones; ++zone) {
+    const auto at = static_cast<std::size_t>(zone);
+    double end = 0.0;
+    switch (sense_.classify(scan.ranges[at], scan.status[at])) {
+      case ZoneState::kTarget:
+      case ZoneState::kUncertain:
+        end = scan.ranges[at];
+        break;
+      case ZoneState::kEmpty:
+        end = sense_.farthest(zone);
+        break;
+      case ZoneState::kInvalid:
+        break;
+    }
+    sensor.view.empty_to[at] = static_cast<float>(end);
+  }
+}
+
+/// Once the filter has judged a sensor's new scan: its points go to motion, those of the scan
+/// before to memory.
+void Perception::let_go(std::size_t id) {
+  Sensor& sensor = sensors_[id];
+  if (!sensor.leaves) return;
+  sensor.leaves = false;
+  if (motion_) {
+    motion_->see(sensor.stamp,
+                 std::span(sensor.kept_W).first(static_cast<std::size_t>(sensor.n_kept)));
+  }
+  if (!memory_) return;
+  memory_->leave(std::span(sensor.left).first(static_cast<std::size_t>(sensor.n_left)), sensor.view,
+                 *robot_, posture_);
+  memory_->see(id, sensor.view);
+}
+
+void Perception::remember(double time, const Posture& posture) {
+  if (!memory_) return;
+  Stopwatch watch(timings);
+  memory_->update(time);
+  // What was no body at its stamp may lie where the arm is now: noise, or the arm itself unseen.
+  const auto points_W = memory_->points_W();
+  const auto n = static_cast<std::size_t>(points_W.rows());
+  const std::span<bool> body(body_.get(), n);
+  std::fill(body.begin(), body.end(), true);
+  remove_near_surface(*robot_, posture, points_W, memory_->tolerances(), body, &steps_);
+  for (bool& mark : body) mark = !mark;
+  if (memory_->held() >= 0) body[static_cast<std::size_t>(memory_->held())] = false;
+  memory_->forget(body);
+  if (memory_->version() != appended_) append();
+  memory_us += watch.lap_us();
+}
+
+/// What is remembered, behind what is seen.
+void Perception::append() {
+  const auto points_W = memory_->points_W();
+  const Eigen::Index n = points_W.rows();
+  cloud_.middleRows(n_seen_, n) = points_W;
+  std::copy_n(memory_->origins().begin(), n, origins_.begin() + n_seen_);
+  std::copy_n(memory_->stamps().begin(), n, stamps_.begin() + n_seen_);
+  n_cloud_ = n_seen_ + n;
+  appended_ = memory_->version();
 }
 
 bool Perception::confirmed(const Sensor& sensor, const std::array<double, kZones>& ranges, int zone,
@@ -197,9 +291,12 @@ void Perception::gather() {
     sensor.cloud_begin = n_cloud_;
     for (int i = 0; i < sensor.n_kept; ++i) {
       origins_[static_cast<std::size_t>(n_cloud_)] = {id, sensor.zone[static_cast<std::size_t>(i)]};
+      stamps_[static_cast<std::size_t>(n_cloud_)] = sensor.stamp;
       cloud_.row(n_cloud_++) = sensor.kept_W[static_cast<std::size_t>(i)].transpose();
     }
   }
+  n_seen_ = n_cloud_;
+  if (memory_) append();
 }
 
 Eigen::Map<const Points> Perception::raw_cloud_W() const {

@@ -7,6 +7,8 @@
 #include "proxcgal/pipeline/command.hpp"
 #include "proxcgal/pipeline/distance.hpp"
 #include "proxcgal/pipeline/filter.hpp"
+#include "proxcgal/pipeline/memory.hpp"
+#include "proxcgal/pipeline/motion.hpp"
 #include "proxcgal/pipeline/sense.hpp"
 #include "proxcgal/pipeline/solve.hpp"
 #include "proxcgal/pipeline/task.hpp"
@@ -50,6 +52,8 @@ struct ControllerConfig {
   Method method = Method::kFast;
   int max_points = 200000;  ///< storage for known points, made at set-up
   bool timings = false;
+  std::optional<MemoryConfig> memory;  ///< of what left the sensors' view; none: as in the paper
+  std::optional<MotionConfig> motion;  ///< x_o of eq. (4) from the scans; none: taken for zero
 
   /// @throws ConfigError  with the field, its value and what is allowed
   void validate() const;
@@ -63,6 +67,7 @@ struct TaskReport {
 
 struct Timings {
   double sense_us = 0, filter_us = 0;
+  double memory_us = 0;    ///< memory and motion
   double distance_us = 0;  ///< closest pair, control points, task rows
   double solve_us = 0;     ///< solver and command
   double total_us = 0;
@@ -76,9 +81,13 @@ struct TickOutput {
   std::optional<ClosestPair> pair;
   double pair_distance() const;  ///< [m] of the pair, infinity for none
   PointOrigin pair_origin;       ///< sensor and zone that saw it, where one did
+  double pair_age = 0.0;         ///< [s] since it was measured, where it was
+  bool pair_remembered = false;  ///< no current scan shows it any more
   /// [m] what of the pair's distance is still to be trusted: less the way that something may have
   /// come since the scan was fresh, negative where the obstacle is inside the surface.
   double trusted_distance = kInfinity;
+  /// [m/s] of the pair's obstacle: as estimated (`tick`) or given (`tick_known`).
+  Vector3 obstacle_velocity_W = Vector3::Zero();
   ControlPair control;  ///< what the first avoidance row acts on, with its obstacle's velocity
   Mode mode = Mode::kRun;
   int n_tasks = 0;
@@ -104,7 +113,7 @@ struct TickRecord {
 };
 inline constexpr int kKeptTicks = 64;
 
-/// The tick: sense -> filter -> distance -> task -> solve -> command, under the monitor.
+/// The tick: sense -> filter -> memory -> distance -> task -> solve -> command, under the monitor.
 ///
 /// Set-up throws; a tick never throws, allocates, locks, logs, or reads a clock for a decision.
 /// Not thread-safe: one controller, one thread.
@@ -134,8 +143,12 @@ class Controller {
   /// @name State of the last tick
   /// @{
   std::span<const Finding> findings() const;
-  Eigen::Map<const Points> cloud_W() const;  ///< filtered, of the sensors: what `tick` avoids
+  /// What `tick` avoids: the filtered points of the sensors' last scans, then those remembered.
+  Eigen::Map<const Points> cloud_W() const;
   std::span<const PointOrigin> cloud_origins() const;
+  Eigen::Index seen_points() const;  ///< rows of `cloud_W` that the last scans show
+  /// [s] since each row of `cloud_W` was measured.
+  std::vector<double> cloud_ages(double time) const;
   /// Every point of the sensors' last scans before body removal, in world.
   Eigen::Map<const Points> raw_cloud_W() const;
   std::vector<double> scan_ages(double time) const;  ///< [s] per sensor, infinity where none came

@@ -80,9 +80,13 @@ int PointChunk::near_rows(const LinkBox& box, const Limits& squared_limits, Rows
   return kernels().near_rows(view_, box.view_, allowance(box), squared_limits.data(), rows.data());
 }
 
+void PointChunk::squared_bounds(const LinkBox& box, Limits& out) const {
+  kernels().squared_bounds(view_, box.view_, allowance(box), out.data());
+}
+
 std::pair<int, float> PointChunk::likeliest(const LinkBox& box) const {
-  std::array<float, kRoom> bounds;
-  kernels().squared_bounds(view_, box.view_, allowance(box), bounds.data());
+  Limits bounds;
+  squared_bounds(box, bounds);
   const auto least = std::min_element(bounds.begin(), bounds.begin() + count());
   return {static_cast<int>(least - bounds.begin()), *least};
 }

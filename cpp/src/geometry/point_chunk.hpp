@@ -40,6 +40,9 @@ class PointChunk {
   /// @return how many
   int near_rows(const LinkBox& box, const Limits& squared_limits, Rows& rows) const;
 
+  /// Each row's squared distance to the box, from below.
+  void squared_bounds(const LinkBox& box, Limits& out) const;
+
   /// The row with the least lower bound, and that bound.
   std::pair<int, float> likeliest(const LinkBox& box) const;
 

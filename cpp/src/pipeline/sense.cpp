@@ -60,6 +60,11 @@ ZoneState Sense::classify(double range, std::uint8_t status) const {
   return status == kValid ? ZoneState::kTarget : ZoneState::kUncertain;
 }
 
+double Sense::farthest(int zone) const {
+  const double along_z = model_.workspace / ray_per_range_[static_cast<std::size_t>(zone)];
+  return std::min(along_z, model_.max_range);
+}
+
 Vector3 Sense::point(int zone, double range) const {
   const auto row = static_cast<std::size_t>(zone);
   return {range * x_per_range_[row], range * y_per_range_[row], range};

@@ -65,6 +65,9 @@ class Sense {
   ZoneState classify(double range, std::uint8_t status) const;
   void operator()(const Scan& scan, SensedPoints& out) const;
 
+  /// How far along z the workspace goes in a zone: what is farther is not in the cloud [m].
+  double farthest(int zone) const;
+
   /// The point of zone `zone` at `range`, in the sensor's frame [m].
   Vector3 point(int zone, double range) const;
 

@@ -1,0 +1,340 @@
+#include "proxcgal/pipeline/memory.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "geometry/point_chunk.hpp"
+#include "require.hpp"
+#include "voxel_index.hpp"
+
+namespace proxcgal {
+namespace {
+
+constexpr int kSide = 8;
+constexpr float kNearest = 0.02F;            // [m] along z: nearer than that no zone tells a range
+constexpr std::int64_t kPairsATick = 16384;  // (point, scan) that one tick looks at
+
+/// Where the zones of a scan look, as tangents.
+struct Zones {
+  std::array<float, kSide> middle;
+  std::array<float, kSide + 1> border;
+
+  explicit Zones(double field_of_view) {
+    const double pitch = field_of_view / kSide;
+    for (std::size_t i = 0; i < kSide; ++i)
+      middle[i] = static_cast<float>(std::tan((static_cast<double>(i) - 3.5) * pitch));
+    for (std::size_t i = 0; i <= kSide; ++i)
+      border[i] = static_cast<float>(std::tan((static_cast<double>(i) - 4.0) * pitch));
+  }
+  float edge() const { return border[kSide]; }
+  /// The last of ascending `bounds` at or below a tangent, -1 for none.
+  template <std::size_t n>
+  static int below(const std::array<float, n>& bounds, float tangent) {
+    int at = -1;
+    while (at + 1 < static_cast<int>(n) && bounds[static_cast<std::size_t>(at + 1)] <= tangent)
+      ++at;
+    return at;
+  }
+};
+
+/// What a scan says of one point.
+enum class Verdict : std::uint8_t { kNothing, kThrough, kThere };
+
+}  // namespace
+
+void MemoryConfig::validate() const {
+  require(std::isfinite(memory_s) && memory_s >= 0.0, "memory.memory_s", memory_s,
+          "finite and 0 s or more");
+  require(voxel >= 0.005 && voxel <= 0.5, "memory.voxel", voxel, "between 0.005 and 0.5 m");
+  require(max_points >= 1 && max_points <= 65536, "memory.max_points", max_points,
+          "between 1 and 65536");
+  require(clear_scans >= 1 && clear_scans <= 100, "memory.clear_scans", clear_scans,
+          "between 1 and 100");
+}
+
+struct Memory::Impl {
+  MemoryConfig config;
+  ViewModel model;
+  Zones zones;
+  detail::VoxelIndex index;
+
+  // One row each, side by side; the first `count` are in use.
+  int count = 0;
+  int held = -1;
+  Points points_W;
+  std::vector<float> x, y, z;
+  std::vector<double> stamp, tolerance;
+  std::vector<PointOrigin> origin;
+  std::vector<detail::VoxelIndex::Key> key;
+  std::vector<int> through;           // scans that saw through it
+  std::vector<double> through_stamp;  // [s] of the last of them
+  std::uint64_t version = 0;
+
+  struct Pending {
+    ScanView view;
+    int next = -1;  // the row to look at next, counted down; -1: all done
+  };
+  std::vector<Pending> pending;
+  std::size_t turn = 0;  // sensor whose scan is worked off next
+
+  // Of `make_room`.
+  std::vector<float> bound;  // [m^2] to the arm, from below
+  std::vector<float> sorted;
+  float limit = INFINITY;  // [m^2] of those kept when room was last made, in this tick
+  Points fresh_W = Points::Zero(kZones, 3);
+  std::array<float, kZones> fresh_bound{};
+
+  Impl(const MemoryConfig& c, const ViewModel& m, std::size_t sensors)
+      : config(c),
+        model(m),
+        zones(m.field_of_view),
+        index(c.voxel, c.max_points),
+        pending(sensors) {
+    const auto n = static_cast<std::size_t>(config.max_points);
+    points_W.setZero(config.max_points, 3);
+    for (auto* floats : {&x, &y, &z, &bound, &sorted}) floats->resize(n);
+    for (auto* doubles : {&stamp, &tolerance, &through_stamp}) doubles->resize(n);
+    origin.resize(n);
+    key.resize(n);
+    through.resize(n);
+  }
+
+  /// Noise of a range along z, and half a voxel for what the surface does between two rays [m].
+  float margin(float along_z) const {
+    const double sigma = std::max(model.sigma_floor, model.sigma_ratio * along_z);
+    return static_cast<float>(model.sigmas * sigma + 0.5 * config.voxel);
+  }
+
+  /// @param point_S  inside the field of view
+  Verdict judge(const ScanView& view, float px, float py, float pz) const {
+    const float tx = px / pz, ty = py / pz, far = margin(pz);
+    const int zx = std::clamp(Zones::below(zones.border, tx), 0, kSide - 1);
+    const int zy = std::clamp(Zones::below(zones.border, ty), 0, kSide - 1);
+    const float seen = view.obstacle[static_cast<std::size_t>(kSide * zy + zx)];
+    if (seen > 0.0F && std::abs(seen - pz) <= far) return Verdict::kThere;
+    const int cx = Zones::below(zones.middle, tx), cy = Zones::below(zones.middle, ty);
+    if (cx < 0 || cy < 0 || cx >= kSide - 1 || cy >= kSide - 1) return Verdict::kNothing;
+    for (const int corner : {0, 1, kSide, kSide + 1}) {
+      const float end = view.empty_to[static_cast<std::size_t>(kSide * cy + cx + corner)];
+      if (!(end > pz + far)) return Verdict::kNothing;
+    }
+    const float dx = (tx - zones.middle[static_cast<std::size_t>(zx)]) * pz;
+    const float dy = (ty - zones.middle[static_cast<std::size_t>(zy)]) * pz;
+    const auto round_voxel = static_cast<float>(0.5 * std::numbers::sqrt3 * config.voxel);
+    return dx * dx + dy * dy <= round_voxel * round_voxel ? Verdict::kThrough : Verdict::kNothing;
+  }
+
+  Verdict judge(const ScanView& view, const Vector3& point_W) const {
+    const Vector3 point_S = view.T_WS.linear().transpose() * (point_W - view.T_WS.translation());
+    const auto px = static_cast<float>(point_S.x()), py = static_cast<float>(point_S.y()),
+               pz = static_cast<float>(point_S.z());
+    const float wide = zones.edge() * pz;
+    if (!(pz > kNearest && std::abs(px) <= wide && std::abs(py) <= wide)) return Verdict::kNothing;
+    return judge(view, px, py, pz);
+  }
+
+  void write(int row, const RememberedPoint& from, bool was_through, double now) {
+    const auto at = static_cast<std::size_t>(row);
+    points_W.row(row) = from.point_W.transpose();
+    x[at] = static_cast<float>(from.point_W.x());
+    y[at] = static_cast<float>(from.point_W.y());
+    z[at] = static_cast<float>(from.point_W.z());
+    stamp[at] = from.stamp;
+    tolerance[at] = from.tolerance;
+    origin[at] = from.origin;
+    through[at] = was_through ? 1 : 0;
+    through_stamp[at] = was_through ? now : -kInfinity;
+    ++version;
+  }
+
+  void remove(int row) {
+    const auto at = static_cast<std::size_t>(row), last = static_cast<std::size_t>(count - 1);
+    index.erase(key[at]);
+    if (held == row) held = -1;
+    if (at != last) {
+      if (held == count - 1) held = row;
+      points_W.row(row) = points_W.row(count - 1);
+      for (auto* floats : {&x, &y, &z, &bound}) (*floats)[at] = (*floats)[last];
+      for (auto* doubles : {&stamp, &tolerance, &through_stamp}) (*doubles)[at] = (*doubles)[last];
+      origin[at] = origin[last];
+      key[at] = key[last];
+      through[at] = through[last];
+      index.put(key[at], row);
+    }
+    --count;
+    ++version;
+  }
+
+  /// Squared distance from each row to the arm's boxes, from below.
+  template <class PointsLike>
+  static void bounds(const PointsLike& rows_W, const Robot& robot, const Posture& posture,
+                     float* out) {
+    for (Eigen::Index begin = 0; begin < rows_W.rows(); begin += detail::PointChunk::kRoom) {
+      const detail::PointChunk chunk(rows_W, begin);
+      std::fill_n(out + begin, chunk.count(), INFINITY);
+      for (int link = 0; link < robot.n_links(); ++link) {
+        const detail::LinkBox box(robot.tree(link).bounds(),
+                                  posture.T_WL[static_cast<std::size_t>(link)]);
+        detail::PointChunk::Limits squared;
+        chunk.squared_bounds(box, squared);
+        for (int i = 0; i < chunk.count(); ++i)
+          out[begin + i] = std::min(out[begin + i], squared[static_cast<std::size_t>(i)]);
+      }
+    }
+  }
+
+  /// Forgets the farther half; of what is equally far as much as is needed.
+  void make_room(const Robot& robot, const Posture& posture) {
+    bounds(points_W.topRows(count), robot, posture, bound.data());
+    std::copy_n(bound.begin(), count, sorted.begin());
+    const auto middle = sorted.begin() + count / 2;
+    std::nth_element(sorted.begin(), middle, sorted.begin() + count);
+    limit = *middle;
+    const int enough = count / 2;
+    for (const bool equal : {false, true}) {
+      for (int row = count - 1; row >= 0 && count > enough; --row) {
+        const float squared = bound[static_cast<std::size_t>(row)];
+        if (row != held && (equal ? squared == limit : squared > limit)) remove(row);
+      }
+    }
+  }
+
+  /// @param points  at most kZones
+  void leave(std::span<const RememberedPoint> points, const ScanView& now, const Robot& robot,
+             const Posture& posture) {
+    std::array<const RememberedPoint*, kZones> fresh;
+    std::array<bool, kZones> was_through;
+    int n = 0;
+    for (const RememberedPoint& point : points) {
+      const Verdict verdict = judge(now, point.point_W);
+      const bool seen_through = verdict == Verdict::kThrough;
+      if (verdict == Verdict::kThere || (seen_through && config.clear_scans == 1)) continue;
+      was_through[static_cast<std::size_t>(n)] = seen_through;
+      fresh[static_cast<std::size_t>(n++)] = &point;
+    }
+    const bool tight = count + n > config.max_points;
+    if (tight) {
+      for (int i = 0; i < n; ++i)
+        fresh_W.row(i) = fresh[static_cast<std::size_t>(i)]->point_W.transpose();
+      bounds(fresh_W.topRows(n), robot, posture, fresh_bound.data());
+    }
+    for (int i = 0; i < n; ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      // Farther than all that was kept when room was made a moment ago.
+      if (tight && fresh_bound[at] > limit) continue;
+      const auto voxel = index.key(fresh[at]->point_W);
+      int row = index.find(voxel);
+      if (row != detail::VoxelIndex::kNone) {
+        if (fresh[at]->stamp < stamp[static_cast<std::size_t>(row)]) continue;
+      } else {
+        if (count == config.max_points) {
+          make_room(robot, posture);
+          if (fresh_bound[at] > limit || count == config.max_points) continue;
+        }
+        row = count++;
+        key[static_cast<std::size_t>(row)] = voxel;
+        index.put(voxel, row);
+      }
+      write(row, *fresh[at], was_through[at], now.stamp);
+    }
+  }
+
+  void work_off(Pending& one, std::int64_t& left) {
+    const Eigen::Matrix3f R = one.view.T_WS.linear().transpose().cast<float>();
+    const Eigen::Vector3f t = one.view.T_WS.translation().cast<float>();
+    constexpr int block = 16;
+    // Downwards: what takes a removed row's place was looked at already.
+    one.next = std::min(one.next, count - 1);
+    while (one.next >= 0 && left > 0) {
+      const int begin = std::max(one.next - block + 1, 0), n = one.next - begin + 1;
+      std::array<float, block> px, py, pz;
+      std::array<int, block> in;
+      for (int i = 0; i < n; ++i) {
+        const auto at = static_cast<std::size_t>(begin + i), to = static_cast<std::size_t>(i);
+        const float dx = x[at] - t.x(), dy = y[at] - t.y(), dz = z[at] - t.z();
+        px[to] = R(0, 0) * dx + R(0, 1) * dy + R(0, 2) * dz;
+        py[to] = R(1, 0) * dx + R(1, 1) * dy + R(1, 2) * dz;
+        pz[to] = R(2, 0) * dx + R(2, 1) * dy + R(2, 2) * dz;
+        const float wide = zones.edge() * pz[to];
+        in[to] = static_cast<int>(pz[to] > kNearest) & static_cast<int>(std::abs(px[to]) <= wide) &
+                 static_cast<int>(std::abs(py[to]) <= wide);
+      }
+      for (int i = n - 1; i >= 0; --i) {
+        const auto to = static_cast<std::size_t>(i);
+        if (in[to] != 0) take(begin + i, one.view, judge(one.view, px[to], py[to], pz[to]));
+      }
+      left -= n;
+      one.next = begin - 1;
+    }
+  }
+
+  void take(int row, const ScanView& view, Verdict verdict) {
+    const auto at = static_cast<std::size_t>(row);
+    if (!(view.stamp > stamp[at])) return;  // an older scan says nothing against a newer point
+    if (verdict == Verdict::kThere) {
+      remove(row);
+    } else if (verdict == Verdict::kThrough && view.stamp > through_stamp[at]) {
+      through_stamp[at] = view.stamp;
+      if (++through[at] >= config.clear_scans) remove(row);
+    }
+  }
+};
+
+Memory::Memory(const MemoryConfig& config, const ViewModel& model, std::size_t sensors)
+    : impl_(std::make_unique<Impl>(config, model, sensors)) {}
+Memory::~Memory() = default;
+Memory::Memory(Memory&&) noexcept = default;
+
+void Memory::leave(std::span<const RememberedPoint> points, const ScanView& now, const Robot& robot,
+                   const Posture& posture) {
+  Impl& me = *impl_;
+  for (std::size_t begin = 0; begin < points.size(); begin += kZones)
+    me.leave(points.subspan(begin, std::min<std::size_t>(kZones, points.size() - begin)), now,
+             robot, posture);
+}
+
+void Memory::see(std::size_t sensor, const ScanView& view) {
+  impl_->pending[sensor].view = view;
+  impl_->pending[sensor].next = impl_->count - 1;
+}
+
+void Memory::update(double time) {
+  Impl& me = *impl_;
+  me.limit = INFINITY;
+  for (int row = me.count - 1; row >= 0; --row) {
+    if (time - me.stamp[static_cast<std::size_t>(row)] > me.config.memory_s) me.remove(row);
+  }
+  std::int64_t left = kPairsATick;
+  for (std::size_t looked = 0; looked < me.pending.size() && left > 0; ++looked) {
+    Impl::Pending& one = me.pending[me.turn];
+    me.work_off(one, left);
+    if (one.next < 0) me.turn = (me.turn + 1) % me.pending.size();
+  }
+}
+
+void Memory::forget(std::span<const bool> gone) {
+  for (int row = impl_->count - 1; row >= 0; --row) {
+    if (gone[static_cast<std::size_t>(row)]) impl_->remove(row);
+  }
+}
+
+void Memory::hold(int row) { impl_->held = row < impl_->count ? row : -1; }
+int Memory::held() const { return impl_->held; }
+
+Eigen::Map<const Points> Memory::points_W() const {
+  return {impl_->points_W.data(), impl_->count, 3};
+}
+std::span<const PointOrigin> Memory::origins() const {
+  return {impl_->origin.data(), static_cast<std::size_t>(impl_->count)};
+}
+std::span<const double> Memory::stamps() const {
+  return {impl_->stamp.data(), static_cast<std::size_t>(impl_->count)};
+}
+std::span<const double> Memory::tolerances() const {
+  return {impl_->tolerance.data(), static_cast<std::size_t>(impl_->count)};
+}
+std::uint64_t Memory::version() const { return impl_->version; }
+
+}  // namespace proxcgal

@@ -1,0 +1,228 @@
+#include "proxcgal/pipeline/motion.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "require.hpp"
+
+namespace proxcgal {
+namespace {
+
+constexpr int kMostPoints = 256;        // of a patch: bounded work
+constexpr int kFewest = 14;             // points, for the nine unknowns
+constexpr double kFresh = 0.10;         // [s] a patch that was not seen since has no velocity
+constexpr double kLeastBaseline = 0.1;  // [s] between its first and its last scan: three at 15 Hz
+constexpr double kMoved = 0.02;         // [m] of the anchor, from where on it is asked anew
+constexpr double kLeastNoise = 0.003;   // [m] residuals are never believed to be smaller
+constexpr double kFastest = 0.5;        // [m/s] the spread of velocities that is taken for likely
+constexpr double kOutlier = 2.5;        // standard deviations from where on a point counts less
+
+using Matrix9 = Eigen::Matrix<double, 9, 9>;
+using Vector9 = Eigen::Matrix<double, 9, 1>;
+
+}  // namespace
+
+void MotionConfig::validate() const {
+  require(window > 0.0 && window <= 1.0, "motion.window", window, "above 0 and at most 1 s");
+  require(radius > 0.0 && radius <= 1.0, "motion.radius", radius, "above 0 and at most 1 m");
+  require(std::isfinite(confidence) && confidence >= 0.0, "motion.confidence", confidence,
+          "finite and 0 or more");
+  require(std::isfinite(max_speed) && max_speed >= 0.0, "motion.max_speed", max_speed,
+          "finite and 0 m/s or more");
+}
+
+struct Motion::Impl {
+  MotionConfig config;
+  // The last points, oldest overwritten first.
+  std::vector<float> x, y, z;
+  std::vector<double> stamp;
+  std::vector<std::uint32_t> near;  // rows of a patch, the newest first
+  std::size_t next = 0;
+  bool changed = false;
+
+  Vector3 anchor_W = Vector3::Constant(kInfinity);
+  Vector3 velocity_W = Vector3::Zero();
+  double newest = -kInfinity;  // [s] of the patch that it is of
+
+  struct Patch {
+    int n = 0;
+    std::array<Vector3, kMostPoints> point;  // from the anchor
+    std::array<double, kMostPoints> time;    // [s] from now, 0 or less
+    std::array<double, kMostPoints> weight;
+  } patch;
+
+  Impl(const MotionConfig& c, std::size_t sensors) : config(c) {
+    // The window at 15 Hz and a scan to spare.
+    const auto n = std::clamp<std::size_t>(sensors, 1, 256) * kZones *
+                   static_cast<std::size_t>(std::ceil(config.window * 15.0) + 1.0);
+    for (auto* floats : {&x, &y, &z}) floats->assign(n, 0.0F);
+    stamp.assign(n, -kInfinity);
+    near.assign(n, 0);
+  }
+
+  void fill(double time, const Vector3& velocity, double age);
+  bool fit(Vector3& velocity, Eigen::Matrix3d& covariance);
+  Vector3 estimate(double time);
+};
+
+/// The points within `radius` of where the anchor was at their time, if it moved so.
+/// @param age  [s] of the oldest that count
+void Motion::Impl::fill(double time, const Vector3& velocity, double age) {
+  patch.n = 0;
+  const auto squared = static_cast<float>(config.radius * config.radius);
+  const Eigen::Vector3f a = anchor_W.cast<float>(), v = velocity.cast<float>();
+  const std::size_t size = x.size();
+  std::size_t found = 0;
+  for (std::size_t back = 0; back < size; ++back) {
+    const std::size_t at = (next + size - 1 - back) % size;
+    if (!(time - stamp[at] <= age)) break;
+    const auto t = static_cast<float>(stamp[at] - time);
+    const float dx = x[at] - a.x() - v.x() * t, dy = y[at] - a.y() - v.y() * t,
+                dz = z[at] - a.z() - v.z() * t;
+    if (dx * dx + dy * dy + dz * dz <= squared) near[found++] = static_cast<std::uint32_t>(at);
+  }
+  // Every so many, the newest first, so that no scan is left out.
+  const std::size_t stride = (found + kMostPoints - 1) / kMostPoints;
+  for (std::size_t i = 0; i < found; i += stride) {
+    const std::size_t at = near[i];
+    const auto to = static_cast<std::size_t>(patch.n++);
+    patch.point[to] = Vector3(x[at], y[at], z[at]) - anchor_W;
+    patch.time[to] = stamp[at] - time;
+    patch.weight[to] = 1.0;
+  }
+}
+
+/// A smooth patch h = f(u, w) that moves as a whole, by least squares:
+///   n'(p - v t) = c0 + c1 u + c2 w + c3 u^2 + c4 u w + c5 w^2,   u, w of p - v t.
+/// Linearised in v, so that a surface that is flat shows its normal velocity only; a weak prior
+/// keeps what cannot be seen at zero.
+bool Motion::Impl::fit(Vector3& velocity, Eigen::Matrix3d& covariance) {
+  const int n = patch.n;
+  if (n < kFewest) return false;
+  Vector3 mean = Vector3::Zero();
+  for (int i = 0; i < n; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    mean += (patch.point[at] - velocity * patch.time[at]) / n;
+  }
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  for (int i = 0; i < n; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const Vector3 d = patch.point[at] - velocity * patch.time[at] - mean;
+    spread += d * d.transpose();
+  }
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes;
+  axes.computeDirect(spread);
+  const Eigen::Matrix3d R = axes.eigenvectors();  // the normal first
+  const Vector3 normal = R.col(0), e_u = R.col(1), e_w = R.col(2);
+  double sigma = 0.01;
+  Vector9 x9 = Vector9::Zero();
+  for (int round = 0; round < 4; ++round) {
+    Matrix9 A = Matrix9::Zero();
+    Vector9 b = Vector9::Zero();
+    double squares = 0.0, weights = 0.0;
+    for (int i = 0; i < n; ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      const double t = patch.time[at];
+      const Vector3 q = patch.point[at] - velocity * t - mean;
+      const double u = e_u.dot(q), w = e_w.dot(q), h = normal.dot(q);
+      const Vector3 slope = normal - (x9[1] + 2.0 * x9[3] * u + x9[4] * w) * e_u -
+                            (x9[2] + x9[4] * u + 2.0 * x9[5] * w) * e_w;
+      Vector9 row;
+      row << 1.0, u, w, u * u, u * w, w * w, t * slope;
+      const double surface = row.head<6>().dot(x9.head<6>());
+      const double r = h - surface;
+      if (round > 0) {
+        const double beyond = std::abs(r) / (kOutlier * sigma);
+        patch.weight[at] = beyond > 1.0 ? 1.0 / (beyond * beyond) : 1.0;
+      }
+      const double weight = patch.weight[at];
+      squares += weight * r * r;
+      weights += weight;
+      A += weight * row * row.transpose();
+      b += weight * h * row;
+    }
+    if (round > 0) sigma = std::max(std::sqrt(squares / std::max(weights - 9.0, 1.0)), kLeastNoise);
+    // The prior is on the velocity itself, not on the step.
+    const double prior = sigma * sigma / (kFastest * kFastest);
+    for (int k = 6; k < 9; ++k) {
+      A(k, k) += prior;
+      b[k] -= prior * velocity[k - 6];
+    }
+    for (int k = 0; k < 6; ++k) A(k, k) += 1e-9;
+    const Eigen::LDLT<Matrix9> solved(A);
+    if (solved.info() != Eigen::Success) return false;
+    x9 = solved.solve(b);
+    velocity += x9.tail<3>();
+    if (!velocity.allFinite() || velocity.norm() > 10.0) return false;
+    if (round == 3) {
+      const Eigen::Matrix<double, 9, 3> columns =
+          solved.solve(Eigen::Matrix<double, 9, 9>::Identity().rightCols<3>());
+      covariance = sigma * sigma * columns.bottomRows<3>();
+    }
+  }
+  return true;
+}
+
+Vector3 Motion::Impl::estimate(double time) {
+  Vector3 velocity = Vector3::Zero();
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  bool fitted = false;
+  newest = -kInfinity;
+  // From the last two scans to the whole window: where the patch was before is told by how it
+  // moves.
+  for (const double share : {0.5, 0.75, 1.0}) {
+    fill(time, velocity, share * config.window + kFresh * (1.0 - share));
+    if (patch.n == 0) return Vector3::Zero();
+    newest = time + patch.time[0];
+    const double first = patch.time[static_cast<std::size_t>(patch.n - 1)];
+    fitted = patch.time[0] - first > 0.03 && fit(velocity, covariance);
+    if (!fitted) velocity.setZero();
+  }
+  const double first = patch.time[static_cast<std::size_t>(patch.n - 1)];
+  if (!fitted || patch.time[0] - first < kLeastBaseline) return Vector3::Zero();
+  // What cannot be told from noise is none; the rest is shortened by as much as noise would add.
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes;
+  axes.computeDirect(0.5 * (covariance + covariance.transpose()));
+  Vector3 kept = Vector3::Zero();
+  for (int k = 0; k < 3; ++k) {
+    const double part = axes.eigenvectors().col(k).dot(velocity);
+    const double noise =
+        config.confidence * config.confidence * std::max(axes.eigenvalues()[k], 0.0);
+    if (part * part > noise)
+      kept += part * (1.0 - noise / (part * part)) * axes.eigenvectors().col(k);
+  }
+  const double speed = kept.norm();
+  return speed > config.max_speed ? Vector3(kept * (config.max_speed / speed)) : kept;
+}
+
+Motion::Motion(const MotionConfig& config, std::size_t sensors)
+    : impl_(std::make_unique<Impl>(config, sensors)) {}
+Motion::~Motion() = default;
+Motion::Motion(Motion&&) noexcept = default;
+
+void Motion::see(double stamp, std::span<const Vector3> points_W) {
+  Impl& me = *impl_;
+  for (const Vector3& point_W : points_W) {
+    me.x[me.next] = static_cast<float>(point_W.x());
+    me.y[me.next] = static_cast<float>(point_W.y());
+    me.z[me.next] = static_cast<float>(point_W.z());
+    me.stamp[me.next] = stamp;
+    me.next = (me.next + 1) % me.x.size();
+  }
+  me.changed = true;
+}
+
+Vector3 Motion::velocity_W(double time, const Vector3& anchor_W) {
+  Impl& me = *impl_;
+  if (me.changed || !((anchor_W - me.anchor_W).norm() < kMoved)) {
+    me.anchor_W = anchor_W;
+    me.velocity_W = me.estimate(time);
+    me.changed = false;
+  }
+  return time - me.newest <= kFresh ? me.velocity_W : Vector3(Vector3::Zero());
+}
+
+}  // namespace proxcgal
