@@ -16,6 +16,7 @@ namespace proxcgal::bench {
 namespace {
 
 constexpr double kTickBudget = 150.0, kLargeBudget = 5000.0, kWorstBudget = 66'700.0;  // [us]
+constexpr double kMemoryBudget = 100.0;                                                // [us] more
 constexpr int kTicks = 5000;
 constexpr double kSway = 0.05;  // [rad]
 
@@ -154,6 +155,61 @@ void add_tick(const Cell& cell, const char* name, const std::vector<TaskSpec>& t
         }
         samples.report(state, tasks.size() > 2 ? 0.0 : kTickBudget);
         state.counters["cloud"] = static_cast<double>(controller.cloud_W().rows());
+      });
+}
+
+/// The same ticks with memory and motion, beside a controller without. With new scans at every tick
+/// 384 000 points come in within the 2 s that are remembered.
+/// @param copies  of every sensor, at the same place: 100 bring 192 000 points in one tick
+/// @param every   so many ticks a new scan of every sensor: 7 is 14 Hz
+void add_memory(const Cell& cell, std::size_t copies, std::uint32_t every) {
+  const std::size_t sensors = cell.skin.mounts.size(), all = sensors * copies;
+  add(named(every > 1 ? "tick/memory_14hz" : "tick/memory", cell,
+            static_cast<Eigen::Index>(all) * kZones),
+      copies > 1 ? 140 : kTicks, [&cell, sensors, copies, every, all](benchmark::State& state) {
+        Skin skin{.mounts = {}, .model = cell.skin.model};
+        for (std::size_t s = 0; s < all; ++s) skin.mounts.push_back(cell.skin.mounts[s % sensors]);
+        ControllerConfig config;
+        Controller plain(cell.robot, skin, config);
+        config.memory = MemoryConfig{};
+        config.motion = MotionConfig{};
+        Controller remembering(cell.robot, skin, config);
+        std::vector<Scan> batch(all);
+        JointVector q = cell.posture.q;
+        const std::size_t batches = cell.scans.size() / sensors;
+        std::size_t turn = 0;
+        double time = 0.0;
+        std::uint32_t counter = 0;
+        Samples without, with;
+        std::size_t remembered = 0;
+        for (auto _ : state) {
+          time += config.period;
+          ++counter;
+          for (std::size_t s = 0; s < all; ++s) {
+            const std::size_t from = (turn + s / sensors) % batches;
+            batch[s] = cell.scans[from * sensors + s % sensors];
+            batch[s].sensor = static_cast<int>(s);
+            batch[s].counter = counter;
+            batch[s].stamp = time;
+          }
+          turn = (turn + copies) % batches;
+          for (Eigen::Index j = 0; j < q.size(); ++j)
+            q[j] = cell.posture.q[j] + kSway * std::sin(2.0 * time + static_cast<double>(j));
+          const std::span<const Scan> fresh =
+              counter % every == 0 ? std::span<const Scan>(batch) : std::span<const Scan>();
+          without.take(state,
+                       [&] { benchmark::DoNotOptimize(plain.tick(time, q, fresh, cell.goal)); });
+          with.take(state,
+                    [&] { benchmark::DoNotOptimize(remembering.tick(time, q, fresh, cell.goal)); });
+          remembered +=
+              static_cast<std::size_t>(remembering.cloud_W().rows() - remembering.seen_points());
+        }
+        without.report(state);
+        const double before = state.counters["median_us"];
+        with.report(state);
+        state.counters["more_us"] = state.counters["median_us"] - before;
+        state.counters["more_budget_us"] = kMemoryBudget;
+        state.counters["remembered"] = static_cast<double>(remembered) / counter;
       });
 }
 
@@ -357,6 +413,10 @@ int main(int argc, char** argv) {
       add_tick(
           cell, "tick/five_tasks",
           {JointLimits{}, Avoidance{.nearest = 3}, MinimumAltitude{}, Manipulability{}, Reach{}});
+      add_memory(cell, 1, 1);
+      add_memory(cell, 1, 7);
+      add_memory(cell, 100, 1);
+      add_memory(cell, 100, 7);
       continue;
     }
     add_stages(cell);

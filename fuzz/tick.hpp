@@ -75,6 +75,10 @@ class TickHarness {
     constexpr std::array periods = {0.01, 0.002, 0.05, 1e-6};
     config.period = periods[static_cast<std::size_t>(bytes_.below(4))];
     if (bytes_.one_in_eight()) config.monitor.stuck_after = 1e9;
+    if (sensors_ % 2 == 0) {
+      config.memory = MemoryConfig{.max_points = 100};
+      config.motion = MotionConfig{};
+    }
     return config;
   }
 

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import pytest
 
+import proxcgal as px
 from proxcgal.apps import cli
 from proxcgal.study import static
 from proxcgal.study.campaign import Campaign
@@ -48,6 +49,12 @@ def shared_robots() -> Path:
     return SHARED_ROBOTS
 
 
+@pytest.fixture(scope="session")
+def ur10e() -> px.Robot:
+    """The built-in robot as the controller takes it; its full meshes come with it."""
+    return px.load_robot("ur10e")
+
+
 class Answer(NamedTuple):
     """What a command gave."""
 
@@ -72,7 +79,7 @@ def call(
 
 @pytest.fixture(scope="session")
 def planned() -> Campaign:
-    """A small campaign: two draws of 0.2 s round one scene, three controllers each."""
+    """A small campaign: two draws of 0.2 s round one scene, four controllers each."""
     return static.plan(
         Wishes(runs=2, seed=0, scenarios=("front_plane",), overrides=("duration=0.2",))
     )

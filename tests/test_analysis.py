@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 import proxcgal as px
+from proxcgal.sim.coverage import Coverage
 from proxcgal.study import analysis, figures
 
 HZ = 100
@@ -35,6 +36,7 @@ def make_log(controller: str = "wb", end: float = 0.25, **changes: Any) -> Any:
         activation=np.clip((0.3 - true) / 0.1, 0.0, 1.0),
         control_link=list(link),
         own_m=0.12,
+        coverage=Coverage(0.5, 0.25, 0.25, 0.0),
     )
     for name, value in changes.items():
         setattr(log, name, value)
@@ -61,9 +63,11 @@ def both() -> list[Any]:
 def test_summary_has_the_keys_that_the_experiments_ask_for(both: list[Any]) -> None:
     summary = analysis.static_summary(both)
     assert list(summary) == [
-        "scenario", "robot", "seed", "controllers", "gain_mm", "self_min_m", "failed",
+        "scenario", "robot", "seed", "controllers", "closest_points", "gain_mm", "self_min_m",
+        "failed",
     ]  # fmt: skip
-    assert list(summary["controllers"]) == ["wb", "sm"]
+    assert list(summary["controllers"]) == list(summary["closest_points"]) == ["wb", "sm"]
+    assert tuple(summary["closest_points"]["wb"]) == analysis.COVERAGE_KEYS
     for numbers in summary["controllers"].values():
         assert list(numbers) == [
             "true_min_m", "true_final_m", "seen_min_m", "goal_error_m", "violations", "self_min_m",

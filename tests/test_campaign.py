@@ -119,14 +119,14 @@ def test_after_a_kill_of_everything_two_workers_go_on_and_give_the_summary_of_on
     os.kill(program.pid, signal.SIGKILL)
     program.communicate()
     before = trial_files(folder)
-    assert 2 <= len(before) < 6
+    assert 2 <= len(before) < 8
     answer = call(*SMALL, "--workers", "2", "--keep", "worst:1", "--out", folder)
     assert answer.code == 0
     after = trial_files(folder)
-    assert len(after) == 6
+    assert len(after) == 8
     assert {name: after[name] for name in before} == before
-    assert " of 6: front_plane-1-wb_known: " in answer.err
-    assert answer.err.count(" of 6: ") == 6 - len(before)
+    assert " of 8: front_plane-1-wb_memory: " in answer.err
+    assert answer.err.count(" of 8: ") == 8 - len(before)
     assert summary(folder) == summary(whole)
     wait_until(lambda: not members(program.pid), 90.0)
 
@@ -159,7 +159,7 @@ def test_ctrl_c_tells_what_is_kept_and_how_to_go_on(tmp_path: Path) -> None:
     assert out == ""
     kept = len(trial_files(folder))
     assert err == (
-        f"proxcgal: interrupted; {kept} of 6 trials are kept in out/campaign-static; the same "
+        f"proxcgal: interrupted; {kept} of 8 trials are kept in out/campaign-static; the same "
         "command goes on from there\n"
     )
     wait_until(lambda: not members(program.pid))
@@ -172,7 +172,7 @@ def test_a_trial_whose_worker_was_killed_is_run_again(
     with Pool(2) as pool, Store(tmp_path / "store", {}) as store:
         ended = run_campaign(campaign, store, pool)
     assert (tmp_path / "died").exists()
-    assert [each.outcome.error for each in ended] == [None] * 6
+    assert [each.outcome.error for each in ended] == [None] * 8
     with Pool(1) as pool, Store(tmp_path / "other", {}) as store:
         alone = run_campaign(replace(campaign, perform=performs.numbers), store, pool)
     assert [each.outcome.row for each in ended] == [each.outcome.row for each in alone]
@@ -227,7 +227,7 @@ def test_a_campaign_of_which_every_trial_fails_still_tells_so(
     monkeypatch.setattr(static, "simulate", simulate)
     answer = call(*ONE, "--out", "here")
     assert answer.code == 1
-    assert answer.err.count(": failed: MuJoCo warned\n") == 3
+    assert answer.err.count(": failed: MuJoCo warned\n") == 4
     assert json.loads(summary(Path("here")))["scenes"]["front_plane"]["gain_mm"] is None
 
 
@@ -274,7 +274,7 @@ def test_a_cluster_that_loses_a_worker_with_its_trial_gives_the_summary_of_one_p
     assert answer.code == 0
     begun = Path("begun").read_text().split()
     assert begun.count("front_plane-0-sm") == 2
-    assert len(set(begun)) == 6
+    assert len(set(begun)) == 8
     assert summary(Path("far")) == summary(whole)
 
 
@@ -288,7 +288,7 @@ def test_a_trial_that_kills_every_worker_of_a_cluster_stops_no_other(
     with Pool(1, address) as pool, Store(tmp_path / "store", {}) as store:
         ended = run_campaign(campaign, store, pool)
     assert [each.outcome.error for each in ended] == [
-        None, "its worker process died, once (out of memory?)", *[None] * 4,
+        None, "its worker process died, once (out of memory?)", *[None] * 6,
     ]  # fmt: skip
 
 

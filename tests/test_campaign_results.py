@@ -42,9 +42,9 @@ def trial_files(folder: Path) -> dict[str, int]:
 
 def test_the_table_has_a_row_a_trial(whole: Path) -> None:
     table = pl.read_parquet(whole / "trials.parquet")
-    assert table.shape[0] == 6
-    assert table["key"].n_unique() == 6
-    assert table["controller"].to_list() == ["wb", "sm", "wb_known"] * 2
+    assert table.shape[0] == 8
+    assert table["key"].n_unique() == 8
+    assert table["controller"].to_list() == ["wb", "sm", "wb_known", "wb_memory"] * 2
     for row in table.iter_rows(named=True):
         scenario = load_scenario("front_plane", shlex.split(row["command"])[8:])
         assert scenario.obstacles[0].position[0] == row["panel_x_m"]
@@ -113,7 +113,7 @@ def test_a_recording_that_fails_is_told_and_costs_no_result(
     assert [(entry["name"], entry["error"]) for entry in told] == [
         ("front_plane-0-wb", "disk full")
     ]
-    assert pl.read_parquet("here/trials.parquet").shape[0] == 3
+    assert pl.read_parquet("here/trials.parquet").shape[0] == 4
     assert "not recorded: disk full" in Path("here/report.html").read_text()
 
 
@@ -129,7 +129,7 @@ def test_recordings_of_other_trials_go_half_ones_too(tmp_path: Path) -> None:
 def test_more_runs_go_on_where_fewer_ended(call: Call, whole: Path) -> None:
     assert call(*ONE, "--keep", "none", "--out", "here").code == 0
     before = trial_files(Path("here"))
-    assert len(before) == 3
+    assert len(before) == 4
     more = (*SMALL, "--keep", "worst:1", "--out", "here")
     assert call(*more).code == 0
     after = trial_files(Path("here"))
@@ -141,4 +141,4 @@ def test_a_report_is_made_again_from_the_folder(whole: Path) -> None:
     before = (whole / "report.html").read_bytes()
     assert cli.main(["report", str(whole)]) == 0
     assert (whole / "report.html").read_bytes() == before
-    assert before.count(b"<img ") == 1
+    assert before.count(b"<img ") == 2

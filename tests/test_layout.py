@@ -29,7 +29,6 @@ CPP_LAYER_OF = {
     "joint_history": "controller",
     "freshness": "controller",
     "perception": "controller",
-    "velocities": "controller",
     "caution": "controller",
     "internal_clock": "controller",
     "tick_history": "controller",

@@ -166,7 +166,7 @@ def test_unknown_kind_lists_those_that_exist() -> None:
 
 
 def test_unknown_name_lists_the_scenarios() -> None:
-    with pytest.raises(ConfigError, match="one of: front_plane, side_plane"):
+    with pytest.raises(ConfigError, match="one of: front_plane, memory_blind_post, side_plane"):
         load_scenario("front_plan")
 
 

@@ -57,8 +57,9 @@ ControllerConfig five_tasks() {
 }
 
 TEST(Controller, TickAllocatesNothing) {
-  for (const auto& config : {ControllerConfig{}, five_tasks(),
-                             ControllerConfig{.control_point = ControlPoint::kSensor}}) {
+  for (const auto& config :
+       {ControllerConfig{}, five_tasks(), ControllerConfig{.control_point = ControlPoint::kSensor},
+        ControllerConfig{.memory = MemoryConfig{.max_points = 200}, .motion = MotionConfig{}}}) {
     const auto robot = test::arm();
     Controller controller(robot, test::ring(), config);
     Random random(8);
@@ -67,7 +68,7 @@ TEST(Controller, TickAllocatesNothing) {
     std::vector<std::vector<Scan>> batches;
     for (std::uint32_t i = 0; i < 300; ++i) batches.push_back(scans(random, 10, i, 0.07 * i));
     std::size_t found = 0, allocations = 0;
-    const int ticks = test::repeats(34'000, 334'000);  // 10^5 or 10^6 over the three
+    const int ticks = test::repeats(25'000, 250'000);  // 10^5 or 10^6 over the four
     for (int i = 0; i < ticks; ++i) {
       const std::vector<Scan> none;
       auto& batch = batches[static_cast<std::size_t>(i / 7) % batches.size()];

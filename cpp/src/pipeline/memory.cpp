@@ -13,8 +13,9 @@ namespace proxcgal {
 namespace {
 
 constexpr int kSide = 8;
-constexpr float kNearest = 0.02F;            // [m] along z: nearer than that no zone tells a range
-constexpr std::int64_t kPairsATick = 16384;  // (point, scan) that one tick looks at
+constexpr float kNearest = 0.02F;           // [m] along z: nearer than that no zone tells a range
+constexpr std::int64_t kPairsAView = 64;    // that a scan costs whatever there is to look at
+constexpr std::int64_t kPairsATick = 8192;  // (point, scan) that one tick looks at
 
 /// Where the zones of a scan look, as tangents.
 struct Zones {
@@ -32,7 +33,11 @@ struct Zones {
   /// The last of ascending `bounds` at or below a tangent, -1 for none.
   template <std::size_t n>
   static int below(const std::array<float, n>& bounds, float tangent) {
-    int at = -1;
+    // Tangents are nearly even: the guess is at most a step off.
+    const float share = 0.5F * (tangent - bounds[0]) / -bounds[0];
+    int at =
+        std::clamp(static_cast<int>(share * static_cast<float>(n - 1)), 0, static_cast<int>(n) - 1);
+    while (at >= 0 && bounds[static_cast<std::size_t>(at)] > tangent) --at;
     while (at + 1 < static_cast<int>(n) && bounds[static_cast<std::size_t>(at + 1)] <= tangent)
       ++at;
     return at;
@@ -72,12 +77,9 @@ struct Memory::Impl {
   std::vector<double> through_stamp;  // [s] of the last of them
   std::uint64_t version = 0;
 
-  struct Pending {
-    ScanView view;
-    int next = -1;  // the row to look at next, counted down; -1: all done
-  };
-  std::vector<Pending> pending;
-  std::size_t turn = 0;  // sensor whose scan is worked off next
+  std::vector<ScanView> views;  // the newest of each sensor
+  std::vector<int> next;        // row to look at next in it, counted down; -1: all done
+  std::size_t turn = 0;         // sensor whose scan is worked off next
 
   // Of `make_room`.
   std::vector<float> bound;  // [m^2] to the arm, from below
@@ -91,7 +93,8 @@ struct Memory::Impl {
         model(m),
         zones(m.field_of_view),
         index(c.voxel, c.max_points),
-        pending(sensors) {
+        views(sensors),
+        next(sensors, -1) {
     const auto n = static_cast<std::size_t>(config.max_points);
     points_W.setZero(config.max_points, 3);
     for (auto* floats : {&x, &y, &z, &bound, &sorted}) floats->resize(n);
@@ -102,14 +105,14 @@ struct Memory::Impl {
   }
 
   /// Noise of a range along z, and half a voxel for what the surface does between two rays [m].
-  float margin(float along_z) const {
+  float margin(double along_z) const {
     const double sigma = std::max(model.sigma_floor, model.sigma_ratio * along_z);
     return static_cast<float>(model.sigmas * sigma + 0.5 * config.voxel);
   }
 
   /// @param point_S  inside the field of view
   Verdict judge(const ScanView& view, float px, float py, float pz) const {
-    const float tx = px / pz, ty = py / pz, far = margin(pz);
+    const float tx = px / pz, ty = py / pz, far = margin(static_cast<double>(pz));
     const int zx = std::clamp(Zones::below(zones.border, tx), 0, kSide - 1);
     const int zy = std::clamp(Zones::below(zones.border, ty), 0, kSide - 1);
     const float seen = view.obstacle[static_cast<std::size_t>(kSide * zy + zx)];
@@ -241,14 +244,15 @@ struct Memory::Impl {
     }
   }
 
-  void work_off(Pending& one, std::int64_t& left) {
-    const Eigen::Matrix3f R = one.view.T_WS.linear().transpose().cast<float>();
-    const Eigen::Vector3f t = one.view.T_WS.translation().cast<float>();
+  void work_off(const ScanView& view, int& row, std::int64_t& left) {
+    const Eigen::Matrix3f R = view.T_WS.linear().transpose().cast<float>();
+    const Eigen::Vector3f t = view.T_WS.translation().cast<float>();
     constexpr int block = 16;
+    left -= kPairsAView;
     // Downwards: what takes a removed row's place was looked at already.
-    one.next = std::min(one.next, count - 1);
-    while (one.next >= 0 && left > 0) {
-      const int begin = std::max(one.next - block + 1, 0), n = one.next - begin + 1;
+    row = std::min(row, count - 1);
+    while (row >= 0 && left > 0) {
+      const int begin = std::max(row - block + 1, 0), n = row - begin + 1;
       std::array<float, block> px, py, pz;
       std::array<int, block> in;
       for (int i = 0; i < n; ++i) {
@@ -263,10 +267,10 @@ struct Memory::Impl {
       }
       for (int i = n - 1; i >= 0; --i) {
         const auto to = static_cast<std::size_t>(i);
-        if (in[to] != 0) take(begin + i, one.view, judge(one.view, px[to], py[to], pz[to]));
+        if (in[to] != 0) take(begin + i, view, judge(view, px[to], py[to], pz[to]));
       }
       left -= n;
-      one.next = begin - 1;
+      row = begin - 1;
     }
   }
 
@@ -296,8 +300,8 @@ void Memory::leave(std::span<const RememberedPoint> points, const ScanView& now,
 }
 
 void Memory::see(std::size_t sensor, const ScanView& view) {
-  impl_->pending[sensor].view = view;
-  impl_->pending[sensor].next = impl_->count - 1;
+  impl_->views[sensor] = view;
+  impl_->next[sensor] = impl_->count - 1;
 }
 
 void Memory::update(double time) {
@@ -307,10 +311,10 @@ void Memory::update(double time) {
     if (time - me.stamp[static_cast<std::size_t>(row)] > me.config.memory_s) me.remove(row);
   }
   std::int64_t left = kPairsATick;
-  for (std::size_t looked = 0; looked < me.pending.size() && left > 0; ++looked) {
-    Impl::Pending& one = me.pending[me.turn];
-    me.work_off(one, left);
-    if (one.next < 0) me.turn = (me.turn + 1) % me.pending.size();
+  for (std::size_t looked = 0; looked < me.next.size() && left > 0; ++looked) {
+    int& row = me.next[me.turn];
+    if (row >= 0) me.work_off(me.views[me.turn], row, left);
+    if (row < 0) me.turn = (me.turn + 1) % me.next.size();
   }
 }
 

@@ -11,13 +11,16 @@
 namespace proxcgal {
 namespace {
 
-constexpr int kMostPoints = 256;        // of a patch: bounded work
+constexpr int kMostPoints = 160;        // of a patch: bounded work
+constexpr int kRounds = 3;              // of reweighting
 constexpr int kFewest = 14;             // points, for the nine unknowns
 constexpr double kFresh = 0.10;         // [s] a patch that was not seen since has no velocity
 constexpr double kLeastBaseline = 0.1;  // [s] between its first and its last scan: three at 15 Hz
 constexpr double kMoved = 0.02;         // [m] of the anchor, from where on it is asked anew
 constexpr double kLeastNoise = 0.003;   // [m] residuals are never believed to be smaller
 constexpr double kFastest = 0.5;        // [m/s] the spread of velocities that is taken for likely
+constexpr double kSteepest = 0.3;       // [-] likely slope against the patch's own plane
+constexpr double kMostCurved = 4.0;     // [1/m] likely half curvature: a body of 0.125 m radius
 constexpr double kOutlier = 2.5;        // standard deviations from where on a point counts less
 
 using Matrix9 = Eigen::Matrix<double, 9, 9>;
@@ -36,11 +39,16 @@ void MotionConfig::validate() const {
 
 struct Motion::Impl {
   MotionConfig config;
-  // The last points, oldest overwritten first.
-  std::vector<float> x, y, z;
-  std::vector<double> stamp;
-  std::vector<std::uint32_t> near;  // rows of a patch, the newest first
+  /// One scan's points in single precision, and the box round them.
+  struct Batch {
+    double stamp = -kInfinity;  // [s]
+    int count = 0;
+    std::array<float, kZones> x{}, y{}, z{};
+    Eigen::Vector3f low, high;
+  };
+  std::vector<Batch> batches;  // the oldest is overwritten first
   std::size_t next = 0;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> near;  // batch and row, the newest first
   bool changed = false;
 
   Vector3 anchor_W = Vector3::Constant(kInfinity);
@@ -56,11 +64,9 @@ struct Motion::Impl {
 
   Impl(const MotionConfig& c, std::size_t sensors) : config(c) {
     // The window at 15 Hz and a scan to spare.
-    const auto n = std::clamp<std::size_t>(sensors, 1, 256) * kZones *
-                   static_cast<std::size_t>(std::ceil(config.window * 15.0) + 1.0);
-    for (auto* floats : {&x, &y, &z}) floats->assign(n, 0.0F);
-    stamp.assign(n, -kInfinity);
-    near.assign(n, 0);
+    const auto scans = static_cast<std::size_t>(std::ceil(config.window * 15.0) + 1.0);
+    batches.resize(std::clamp<std::size_t>(sensors, 1, 256) * scans);
+    near.resize(batches.size() * kZones);
   }
 
   void fill(double time, const Vector3& velocity, double age);
@@ -72,25 +78,30 @@ struct Motion::Impl {
 /// @param age  [s] of the oldest that count
 void Motion::Impl::fill(double time, const Vector3& velocity, double age) {
   patch.n = 0;
-  const auto squared = static_cast<float>(config.radius * config.radius);
-  const Eigen::Vector3f a = anchor_W.cast<float>(), v = velocity.cast<float>();
-  const std::size_t size = x.size();
+  const auto radius = static_cast<float>(config.radius);
   std::size_t found = 0;
-  for (std::size_t back = 0; back < size; ++back) {
-    const std::size_t at = (next + size - 1 - back) % size;
-    if (!(time - stamp[at] <= age)) break;
-    const auto t = static_cast<float>(stamp[at] - time);
-    const float dx = x[at] - a.x() - v.x() * t, dy = y[at] - a.y() - v.y() * t,
-                dz = z[at] - a.z() - v.z() * t;
-    if (dx * dx + dy * dy + dz * dz <= squared) near[found++] = static_cast<std::uint32_t>(at);
+  for (std::size_t back = 1; back <= batches.size(); ++back) {
+    const std::size_t at = (next + batches.size() - back) % batches.size();
+    const Batch& batch = batches[at];
+    if (!(time - batch.stamp <= age)) break;
+    const Eigen::Vector3f c = (anchor_W + velocity * (batch.stamp - time)).cast<float>();
+    if (!((c - c.cwiseMax(batch.low).cwiseMin(batch.high)).squaredNorm() <= radius * radius))
+      continue;
+    for (int i = 0; i < batch.count; ++i) {
+      const auto row = static_cast<std::size_t>(i);
+      const float dx = batch.x[row] - c.x(), dy = batch.y[row] - c.y(), dz = batch.z[row] - c.z();
+      if (dx * dx + dy * dy + dz * dz <= radius * radius)
+        near[found++] = {static_cast<std::uint32_t>(at), static_cast<std::uint32_t>(i)};
+    }
   }
   // Every so many, the newest first, so that no scan is left out.
   const std::size_t stride = (found + kMostPoints - 1) / kMostPoints;
   for (std::size_t i = 0; i < found; i += stride) {
-    const std::size_t at = near[i];
+    const Batch& batch = batches[near[i].first];
+    const std::size_t row = near[i].second;
     const auto to = static_cast<std::size_t>(patch.n++);
-    patch.point[to] = Vector3(x[at], y[at], z[at]) - anchor_W;
-    patch.time[to] = stamp[at] - time;
+    patch.point[to] = Vector3(batch.x[row], batch.y[row], batch.z[row]) - anchor_W;
+    patch.time[to] = batch.stamp - time;
     patch.weight[to] = 1.0;
   }
 }
@@ -119,7 +130,7 @@ bool Motion::Impl::fit(Vector3& velocity, Eigen::Matrix3d& covariance) {
   const Vector3 normal = R.col(0), e_u = R.col(1), e_w = R.col(2);
   double sigma = 0.01;
   Vector9 x9 = Vector9::Zero();
-  for (int round = 0; round < 4; ++round) {
+  for (int round = 0; round < kRounds; ++round) {
     Matrix9 A = Matrix9::Zero();
     Vector9 b = Vector9::Zero();
     double squares = 0.0, weights = 0.0;
@@ -141,7 +152,7 @@ bool Motion::Impl::fit(Vector3& velocity, Eigen::Matrix3d& covariance) {
       const double weight = patch.weight[at];
       squares += weight * r * r;
       weights += weight;
-      A += weight * row * row.transpose();
+      A.selfadjointView<Eigen::Lower>().rankUpdate(row, weight);
       b += weight * h * row;
     }
     if (round > 0) sigma = std::max(std::sqrt(squares / std::max(weights - 9.0, 1.0)), kLeastNoise);
@@ -151,13 +162,16 @@ bool Motion::Impl::fit(Vector3& velocity, Eigen::Matrix3d& covariance) {
       A(k, k) += prior;
       b[k] -= prior * velocity[k - 6];
     }
-    for (int k = 0; k < 6; ++k) A(k, k) += 1e-9;
+    const double noise = sigma * sigma;
+    A(0, 0) += 1e-9;
+    for (int k = 1; k < 3; ++k) A(k, k) += noise / (kSteepest * kSteepest);
+    for (int k = 3; k < 6; ++k) A(k, k) += noise / (kMostCurved * kMostCurved);
     const Eigen::LDLT<Matrix9> solved(A);
     if (solved.info() != Eigen::Success) return false;
     x9 = solved.solve(b);
     velocity += x9.tail<3>();
     if (!velocity.allFinite() || velocity.norm() > 10.0) return false;
-    if (round == 3) {
+    if (round == kRounds - 1) {
       const Eigen::Matrix<double, 9, 3> columns =
           solved.solve(Eigen::Matrix<double, 9, 9>::Identity().rightCols<3>());
       covariance = sigma * sigma * columns.bottomRows<3>();
@@ -173,7 +187,7 @@ Vector3 Motion::Impl::estimate(double time) {
   newest = -kInfinity;
   // From the last two scans to the whole window: where the patch was before is told by how it
   // moves.
-  for (const double share : {0.5, 0.75, 1.0}) {
+  for (const double share : {0.5, 1.0}) {
     fill(time, velocity, share * config.window + kFresh * (1.0 - share));
     if (patch.n == 0) return Vector3::Zero();
     newest = time + patch.time[0];
@@ -183,7 +197,7 @@ Vector3 Motion::Impl::estimate(double time) {
   }
   const double first = patch.time[static_cast<std::size_t>(patch.n - 1)];
   if (!fitted || patch.time[0] - first < kLeastBaseline) return Vector3::Zero();
-  // What cannot be told from noise is none; the rest is shortened by as much as noise would add.
+  // What cannot be told from noise is none; what hardly can is shortened.
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes;
   axes.computeDirect(0.5 * (covariance + covariance.transpose()));
   Vector3 kept = Vector3::Zero();
@@ -191,8 +205,8 @@ Vector3 Motion::Impl::estimate(double time) {
     const double part = axes.eigenvectors().col(k).dot(velocity);
     const double noise =
         config.confidence * config.confidence * std::max(axes.eigenvalues()[k], 0.0);
-    if (part * part > noise)
-      kept += part * (1.0 - noise / (part * part)) * axes.eigenvectors().col(k);
+    const double share = noise / (part * part);
+    if (part * part > noise) kept += part * (1.0 - share * share) * axes.eigenvectors().col(k);
   }
   const double speed = kept.norm();
   return speed > config.max_speed ? Vector3(kept * (config.max_speed / speed)) : kept;
@@ -205,12 +219,22 @@ Motion::Motion(Motion&&) noexcept = default;
 
 void Motion::see(double stamp, std::span<const Vector3> points_W) {
   Impl& me = *impl_;
-  for (const Vector3& point_W : points_W) {
-    me.x[me.next] = static_cast<float>(point_W.x());
-    me.y[me.next] = static_cast<float>(point_W.y());
-    me.z[me.next] = static_cast<float>(point_W.z());
-    me.stamp[me.next] = stamp;
-    me.next = (me.next + 1) % me.x.size();
+  for (std::size_t begin = 0; begin < points_W.size(); begin += kZones) {
+    Impl::Batch& batch = me.batches[me.next];
+    me.next = (me.next + 1) % me.batches.size();
+    batch.stamp = stamp;
+    batch.count = static_cast<int>(std::min<std::size_t>(kZones, points_W.size() - begin));
+    batch.low.setConstant(INFINITY);
+    batch.high.setConstant(-INFINITY);
+    for (int i = 0; i < batch.count; ++i) {
+      const auto row = static_cast<std::size_t>(i);
+      const Eigen::Vector3f p = points_W[begin + row].cast<float>();
+      batch.x[row] = p.x();
+      batch.y[row] = p.y();
+      batch.z[row] = p.z();
+      batch.low = batch.low.cwiseMin(p);
+      batch.high = batch.high.cwiseMax(p);
+    }
   }
   me.changed = true;
 }

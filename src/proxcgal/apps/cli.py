@@ -22,6 +22,7 @@ usage: proxcgal COMMAND ...
   run SCENARIO   simulate a scene with one or several controllers, write what happened
   demo           both static scenes with all controllers, one report
   campaign KIND  many trials, on this machine or on a cluster, and what they amount to
+  coverage SCENARIO   what the sensors see of the space round the arm
   sweep          time both algorithms, literal and accelerated, over meshes and clouds
   replay FILE    step through a recording
   report DIR     write DIR/report.html from the results in DIR
@@ -45,6 +46,7 @@ COMMANDS = {
     "run": "proxcgal.apps.run",
     "demo": "proxcgal.apps.demo",
     "campaign": "proxcgal.apps.campaign",
+    "coverage": "proxcgal.apps.coverage",
     "sweep": "proxcgal.apps.sweep",
     "replay": "proxcgal.apps.replay",
     "report": "proxcgal.apps.report",

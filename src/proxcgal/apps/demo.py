@@ -43,15 +43,15 @@ def demo_command(options: DemoOptions, command: str) -> int:
     from proxcgal.apps.report import write_report
     from proxcgal.apps.results import Plan, check, combine, perform, ready
     from proxcgal.apps.run import conclude
-    from proxcgal.sim.scenario import CONTROLLERS, load_scenario
+    from proxcgal.sim.scenario import USUAL, load_scenario
 
     workers = checked_workers(options.workers)
     changes = [f"seed={options.seed}", *flat(options.set)]
     scenarios = [load_scenario(name, changes) for name in SCENARIOS]
     for scenario in scenarios:
-        check(scenario, CONTROLLERS, quiet=options.quiet)
+        check(scenario, USUAL, quiet=options.quiet)
     plans = [
-        Plan(scenario=scenario, controllers=CONTROLLERS, folder=options.out / scenario.name)
+        Plan(scenario=scenario, controllers=USUAL, folder=options.out / scenario.name)
         for scenario in scenarios
     ]
     made = origin(command)

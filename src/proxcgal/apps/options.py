@@ -9,7 +9,7 @@ import tyro
 
 from proxcgal.errors import ConfigError
 
-ControllerName = Literal["wb", "sm", "wb_known"]
+ControllerName = Literal["wb", "sm", "wb_known", "wb_memory"]
 T = TypeVar("T")
 
 #: May be given once with several values, or several times.

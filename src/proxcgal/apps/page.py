@@ -35,7 +35,12 @@ PAPER = {
     "more in all",
     "side_plane": "Fig. 8: a similar result; up to 100 mm more in all",
 }
-NAMES = {"wb": "wb, whole body", "sm": "sm, sensor points", "wb_known": "wb_known, scene known"}
+NAMES = {
+    "wb": "wb, whole body",
+    "sm": "sm, sensor points",
+    "wb_known": "wb_known, scene known",
+    "wb_memory": "wb_memory, with memory",
+}
 
 
 def page(runs: Sequence[Run], about: About) -> str:
@@ -83,7 +88,8 @@ def _introduction(runs: Sequence[Run]) -> Iterator[str]:
         "<code>wb</code> moves the surface point nearest to the obstacle, on any link, covered "
         "with sensors or not; <code>sm</code>, the baseline, only the sensors' own mounting "
         "points; <code>wb_known</code> is <code>wb</code> with points of the scene itself in place "
-        "of the sensors: the ceiling, not a result of ours.</p>"
+        "of the sensors: the ceiling, not a result of ours; <code>wb_memory</code> is "
+        "<code>wb</code> that remembers what left the sensors' view.</p>"
     )
 
 

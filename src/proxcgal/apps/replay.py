@@ -46,7 +46,7 @@ class ReplayOptions:
     """Wait for Enter after each line; q ends."""
     controller: Annotated[
         ControllerName | None,
-        tyro.conf.arg(metavar="wb|sm|wb_known", help_behavior_hint=""),
+        tyro.conf.arg(metavar="wb|sm|wb_known|wb_memory", help_behavior_hint=""),
     ] = None
     """Compute the commands of this controller from the recorded inputs."""
     set: Settings = ()

@@ -197,6 +197,7 @@ def _simulate(pool: Pool, trials: Sequence[tuple[Plan, str]], quiet: bool) -> li
             name,
             plan.scenario.seed,
             recording=plan.folder / f"{name}.mcap",
+            coverage=True,
         )
         for plan, name in trials
     ]

@@ -42,10 +42,11 @@ class RunOptions:
     scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO")]
     """A name that `proxcgal scenarios` lists, or a path to a TOML file."""
     controller: Annotated[
-        tuple[ControllerName, ...], tyro.conf.arg(metavar="wb|sm|wb_known ...")
+        tuple[ControllerName, ...], tyro.conf.arg(metavar="wb|sm|wb_known|wb_memory ...")
     ] = ("wb", "sm", "wb_known")
     """wb: the whole body avoids. sm: only the sensors' mounting points do, the baseline.
-    wb_known: wb on points of the scene itself, the ceiling."""
+    wb_known: wb on points of the scene itself, the ceiling. wb_memory: wb that remembers what left
+    the sensors' view."""
     robot: Annotated[str | None, tyro.conf.arg(metavar="NAME|PATH", help_behavior_hint="")] = None
     """A name that `proxcgal robots` lists, or a .urdf or .xml file, instead of the scenario's."""
     package_dir: Folders = ()
@@ -75,7 +76,9 @@ def run_command(options: RunOptions, command: str) -> int:
     from proxcgal.sim.scenario import load_scenario
 
     if not options.controller:
-        raise ConfigError("--controller: none given, at least one of wb, sm, wb_known is needed")
+        raise ConfigError(
+            "--controller: none given, at least one of wb, sm, wb_known, wb_memory is needed"
+        )
     workers = checked_workers(options.workers)
     scenario = load_scenario(options.scenario, overrides(options))
     controllers = tuple(dict.fromkeys(options.controller))
@@ -113,9 +116,12 @@ def conclude(summaries: Sequence[Summary], report: Path) -> int:
     """Prints the table, what failed, and last the report's path; the exit code."""
     import sys
 
-    from proxcgal.study.analysis import SELF_LIMIT_M, table
+    from proxcgal.study.analysis import SELF_LIMIT_M, coverage_lines, table
 
     print(table(summaries))
+    for summary in summaries:
+        for line in coverage_lines(summary["scenario"], summary["closest_points"]):
+            print(line)
     failed = [s for s in summaries if s["failed"]]
     for summary in failed:
         print(

@@ -26,8 +26,11 @@ from proxcgal.sim.scenario_law import Controller
 from proxcgal.sim.scenario_problems import lines
 from proxcgal.sim.scene import ObstacleScene, Scene
 
-#: wb: whole body; sm: sensor points; wb_known: whole body on points of the scene itself.
-CONTROLLERS = ("wb", "sm", "wb_known")
+#: wb: whole body; sm: sensor points; wb_known: whole body on points of the scene itself; wb_memory:
+#: whole body that remembers what left the sensors' view.
+CONTROLLERS = ("wb", "sm", "wb_known", "wb_memory")
+#: Those that run where nobody chooses: the paper's, and their ceiling.
+USUAL = ("wb", "sm", "wb_known")
 
 
 class Scenario(Section):

@@ -16,6 +16,7 @@ from proxcgal.sim.scenario_keys import (
     like,
 )
 
+SensedController = Literal["wb", "sm", "wb_memory"]
 TaskName = Literal["avoidance", "reach", "joint_limits", "minimum_altitude", "manipulability"]
 
 
@@ -99,6 +100,39 @@ class Monitor(Section):
     )
 
 
+class Memory(Section):
+    """What `wb_memory` remembers."""
+
+    memory_s: NonNegative = like(
+        "MemoryConfig", "memory_s", "[s] age at which a point is forgotten in any case; 0: none"
+    )
+    voxel: Positive = like("MemoryConfig", "voxel", "[m] edge; each holds one point, the newest")
+    max_points: Count = like(
+        "MemoryConfig", "max_points", "beyond, those farthest from the arm are forgotten"
+    )
+    clear_scans: Count = like(
+        "MemoryConfig", "clear_scans", "that must see through a point before it counts as gone"
+    )
+
+
+class Motion(Section):
+    """x_o of [WA] eq. (4), from the scans."""
+
+    controllers: tuple[SensedController, ...] = Field(
+        ("wb_memory",), description="of wb, sm, wb_memory: those that use it"
+    )
+    window: Positive = like("MotionConfig", "window", "[s] scans that old count")
+    radius: Positive = like(
+        "MotionConfig", "radius", "[m] of the patch of surface round the closest point"
+    )
+    confidence: NonNegative = like(
+        "MotionConfig", "confidence", "standard deviations below which a velocity counts as none"
+    )
+    max_speed: NonNegative = like(
+        "MotionConfig", "max_speed", "[m/s] the estimate is shortened to it"
+    )
+
+
 class JointLimits(Section):
     """Task `joint_limits`."""
 
@@ -161,6 +195,8 @@ class Controller(Section):
     filter: Filter = Field(default_factory=Filter)
     solver: Solver = Field(default_factory=Solver)
     monitor: Monitor = Field(default_factory=Monitor)
+    memory: Memory = Field(default_factory=Memory)
+    motion: Motion = Field(default_factory=Motion)
     joint_limits: JointLimits = Field(default_factory=JointLimits)
     minimum_altitude: MinimumAltitude = Field(default_factory=MinimumAltitude)
     manipulability: Manipulability = Field(default_factory=Manipulability)

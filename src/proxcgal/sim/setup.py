@@ -67,6 +67,8 @@ class Setup:
         if controller not in CONTROLLERS:
             raise ConfigError(f"controller {controller!r}: there are {', '.join(CONTROLLERS)}")
         settings = self.scenario.controller
+        remembers, tracks = controller == "wb_memory", controller in settings.motion.controllers
+        motion = {k: v for k, v in _keys(settings.motion).items() if k != "controllers"}
         config = _core.ControllerConfig(
             control_point="sensor" if controller == "sm" else "whole_body",
             tasks=[_task(name, settings) for name in settings.tasks],
@@ -78,6 +80,8 @@ class Setup:
             avoid_links=list(settings.avoid_links),
             method=settings.method,
             max_points=max(known_points, 1),
+            memory=_core.MemoryConfig(**_keys(settings.memory)) if remembers else None,
+            motion=_core.MotionConfig(**motion) if tracks else None,
         )
         return _core.Controller(self.robot, self.skin, config)
 

@@ -62,6 +62,9 @@ class TickResult:
     obstacle_W: tuple[float, ...] | None = None  #: (3,) [m] that pair's obstacle point
     sensor: int = -1  #: that saw the obstacle point
     zone: int = -1
+    age: float = 0.0  #: [s] since that point was measured
+    remembered: bool = False  #: no current scan shows that point any more
+    velocity_W: tuple[float, ...] = (0.0, 0.0, 0.0)  #: (3,) [m/s] that obstacle's, as taken
     control_W: tuple[float, ...] | None = None  #: (3,) [m] the point that avoidance moves
     control_link: str = ""  #: its link
     cloud_points: int = 0  #: that the filter kept
@@ -82,6 +85,9 @@ class TickResult:
             obstacle_W=_floats(pair.obstacle_W) if pair else None,
             sensor=out.pair_sensor,
             zone=out.pair_zone,
+            age=out.pair_age,
+            remembered=out.pair_remembered,
+            velocity_W=_floats(out.obstacle_velocity_W),
             control_W=None if out.control_W is None else _floats(out.control_W),
             control_link=out.control_link,
             cloud_points=cloud_points,
@@ -107,8 +113,8 @@ class TickResult:
     def _compared(self) -> tuple[object, ...]:
         return (
             self.qd.tolist(), self.mode, self.seen, self.link, self.surface_W, self.obstacle_W,
-            self.sensor, self.zone, self.control_W, self.control_link, self.cloud_points,
-            self.tasks, self.findings,
+            self.sensor, self.zone, self.age, self.remembered, self.velocity_W, self.control_W,
+            self.control_link, self.cloud_points, self.tasks, self.findings,
         )  # fmt: skip
 
 

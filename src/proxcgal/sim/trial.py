@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from proxcgal import _core
 from proxcgal.models import Robot
+from proxcgal.sim.coverage import coverage_of
 from proxcgal.sim.decisive import decisive_truth
 from proxcgal.sim.faults import FaultInjector
 from proxcgal.sim.loop import run_ticks
@@ -41,6 +42,7 @@ def run_trial(
     on_progress: Progress | None = None,
     sparse_truth: bool = False,
     without_truth: bool = False,
+    coverage: bool = False,
 ) -> TrialLog:
     """Simulates a scenario with one controller.
 
@@ -54,6 +56,7 @@ def run_trial(
         sparse_truth: true distances only where they can change a number of the summary, which
             stays exact; nan elsewhere. A recording has them at every tick.
         without_truth: none at all, for studies of other things; not for a recording.
+        coverage: tell what of the closest points was in view.
 
     Raises:
         ConfigError: what of the scenario does not fit; sensors that do not sit where it says.
@@ -101,11 +104,14 @@ def run_trial(
     elapsed = np.arange(len(ticks), dtype=np.float64) * period
     if truth is None and not without_truth:
         ticks = _with_truth(ticks, elapsed, np.array(reached), setup)
-    return TrialLog.of(
+    log_of_run = TrialLog.of(
         ticks, setup.robot, scenario=scenario.name, controller=controller, seed=seed,
         wall_s=clock.perf_counter() - begin, elapsed=elapsed,
         recording_failure=recorder.failure if recorder else None,
     )  # fmt: skip
+    if not coverage:
+        return log_of_run
+    return replace(log_of_run, coverage=coverage_of(setup, np.array(reached), elapsed))
 
 
 def _with_truth(ticks: Sequence[Tick], elapsed: Array, q: Array, setup: Setup) -> list[Tick]:
@@ -123,7 +129,7 @@ def _with_truth(ticks: Sequence[Tick], elapsed: Array, q: Array, setup: Setup) -
 
 def _leaked(law: _core.Controller, source: SimulatedSource) -> int:
     """How many points of the filtered cloud really are the robot itself."""
-    origins = np.asarray(law.cloud_origins())
+    origins = np.asarray(law.cloud_origins())[: law.seen_points]
     return int(source.saw_robot[origins[:, 0], origins[:, 1]].sum())
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxcgal.models import Robot
+from proxcgal.sim.coverage import NO_COVERAGE, Coverage
 from proxcgal.sim.ticks import Tick
 
 Array = NDArray[np.float64]
@@ -48,6 +49,7 @@ class TrialLog:
     leaked_points: NDArray[np.int64]  #: (n,) of those, how many really are the robot itself
     findings: dict[str, int]  #: in how many ticks each reason was found
     tick_us: Array  #: (n,) wall time of the controller's call
+    coverage: Coverage = NO_COVERAGE  #: nan where not asked for
     recording_failure: str | None = None  #: why the recording stopped early
 
     @classmethod

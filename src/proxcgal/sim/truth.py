@@ -57,10 +57,16 @@ class Truth:
         the run is exact.
         """
         poses_W = np.asarray(self._robot.link_poses(q))
+        return self._to_scene(poses_W, time)._replace(own=self._own.at(poses_W))
+
+    def nearest(self, q: Array, time: float = 0.0) -> TrueDistances:
+        """The same of the scene only: `own` is not asked, nan."""
+        return self._to_scene(np.asarray(self._robot.link_poses(q)), time)
+
+    def _to_scene(self, poses_W: Array, time: float) -> TrueDistances:
         found = self._scene.at(poses_W, time)
         link = self._robot.link_names[found.link] if found.link >= 0 else ""
-        own = self._own.at(poses_W)
-        return TrueDistances(found.distance, link, own, found.solid, found.point_W)
+        return TrueDistances(found.distance, link, np.nan, found.solid, found.point_W)
 
 
 class _Nearest(NamedTuple):

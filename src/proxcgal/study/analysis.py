@@ -30,6 +30,10 @@ CONTROLLER_KEYS = (
 )
 
 
+#: What of the closest points could be known, see `sim.coverage`.
+COVERAGE_KEYS = ("in_view_share", "remembered_share", "forgotten_share", "never_seen_share")
+
+
 def static_summary(logs: Sequence[TrialLog]) -> Summary:
     """Numbers of one scenario, all its controllers: the content of its `summary.json`.
 
@@ -40,9 +44,10 @@ def static_summary(logs: Sequence[TrialLog]) -> Summary:
         `scenario`, `robot`, `seed`, `controllers` (per controller: least true distance [m], true
         distance at the end [m] (mean of the last 2 s), least seen distance [m], goal error at the
         end [m], violations (ticks with a true distance under 0.05 m), least distance between own
-        links [m]), `gain_mm` (true distance at the end, wb over sm; None where one did not run),
-        `self_min_m` of all trials and `failed`, true where that is under 0.02 m. What does not
-        apply is None, a distance to nothing 9.99.
+        links [m]), `closest_points` (per controller: what shares of the truly closest points the
+        sensors had in view, see `sim.coverage`), `gain_mm` (true distance at the end, wb over sm;
+        None where one did not run), `self_min_m` of all trials and `failed`, true where that is
+        under 0.02 m. What does not apply is None, a distance to nothing 9.99.
 
     Raises:
         ConfigError: no log, logs of different scenarios, robots or seeds, a controller twice.
@@ -60,7 +65,7 @@ def static_summary(logs: Sequence[TrialLog]) -> Summary:
     controllers = {}
     for log in logs:
         numbers = log.summary()
-        controllers[log.controller] = {key: _number(numbers.get(key)) for key in CONTROLLER_KEYS}
+        controllers[log.controller] = {key: finite(numbers.get(key)) for key in CONTROLLER_KEYS}
     own = [c["self_min_m"] for c in controllers.values() if c["self_min_m"] is not None]
     self_min = min(own, default=None)
     return {
@@ -68,6 +73,10 @@ def static_summary(logs: Sequence[TrialLog]) -> Summary:
         "robot": logs[0].robot,
         "seed": int(logs[0].seed),
         "controllers": controllers,
+        "closest_points": {
+            log.controller: {key: finite(share) for key, share in log.coverage.numbers().items()}
+            for log in logs
+        },
         "gain_mm": gain_mm(controllers),
         "self_min_m": self_min,
         "failed": self_min is not None and self_min < SELF_LIMIT_M,
@@ -104,6 +113,20 @@ def table(summaries: Sequence[Summary]) -> str:
             last = "" if gain is None else f"{gain:+.0f}"
             rows.append((summary["scenario"], name, *cells, last))
     return aligned(rows, left=2, heads=2)
+
+
+def coverage_lines(scene: str, controllers: Mapping[str, Mapping[str, float | None]]) -> list[str]:
+    """What the sensors had of the truly closest points, a line a controller that was asked."""
+    lines = []
+    for name, numbers in controllers.items():
+        shares = [numbers.get(key) for key in COVERAGE_KEYS]
+        told = [100.0 * share for share in shares if share is not None]
+        if len(told) == len(shares):
+            lines.append(
+                f"{scene}, {name}: of the truly closest points {told[0]:.0f} % were in view, "
+                f"{told[1]:.0f} % remembered, {told[2]:.0f} % forgotten, {told[3]:.0f} % never seen"
+            )
+    return lines
 
 
 def aligned(rows: Sequence[Sequence[str]], *, left: int, heads: int) -> str:
@@ -170,7 +193,7 @@ def write_bytes(path: Path, content: bytes) -> None:
         os.close(folder)
 
 
-def _number(value: Any) -> float | int | None:
+def finite(value: Any) -> float | int | None:
     """A finite plain number: None for NaN, 9.99 for a distance to nothing."""
     if value is None:
         return None

@@ -1,4 +1,4 @@
-"""How sure a median is."""
+"""How sure a median is, or a ratio of sums."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 RESAMPLES = 10_000
 CONFIDENCE = 0.95
@@ -19,6 +20,38 @@ class Interval:
     median: float
     low: float
     high: float
+
+
+@dataclass(frozen=True, slots=True)
+class RatioInterval:
+    """A ratio of sums with its bootstrap interval; None where the sum below is not above 0."""
+
+    middle: float | None
+    low: float | None
+    high: float | None
+
+
+def ratio_interval(
+    above: Sequence[float] | NDArray[np.float64],
+    below: Sequence[float] | NDArray[np.float64],
+    seed: int = 0,
+) -> RatioInterval:
+    """sum(above) / sum(below) over pairs, and its 95 % percentile bootstrap interval.
+
+    Resamples whose sum below is not above 0 have no ratio; where more than 1 in 20 of them have
+    none, the interval has no ends worth telling either.
+    """
+    up, down = np.asarray(above, np.float64), np.asarray(below, np.float64)
+    if not len(up) or not down.sum() > 0.0:
+        return RatioInterval(None, None, None)
+    rows = np.random.default_rng(seed).integers(len(up), size=(RESAMPLES, len(up)))
+    sums = up[rows].sum(axis=1), down[rows].sum(axis=1)
+    good = sums[1] > 0.0
+    if good.mean() < CONFIDENCE:
+        return RatioInterval(None, None, None)
+    tail = 50.0 * (1.0 - CONFIDENCE)
+    low, high = np.percentile(sums[0][good] / sums[1][good], [tail, 100.0 - tail])
+    return RatioInterval(float(up.sum() / down.sum()), float(low), float(high))
 
 
 def median_interval(values: Sequence[float], seed: int = 0) -> Interval | None:

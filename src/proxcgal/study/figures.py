@@ -20,8 +20,13 @@ if TYPE_CHECKING:
 
 DPI = 160
 # Okabe and Ito's palette: told apart with any colour vision, and in print by lightness.
-COLOURS = {"wb": "#0072B2", "sm": "#D55E00", "wb_known": "#009E73"}
-NAMES = {"wb": "whole body (WB)", "sm": "sensor points (SM)", "wb_known": "WB, scene known"}
+COLOURS = {"wb": "#0072B2", "sm": "#D55E00", "wb_known": "#009E73", "wb_memory": "#E69F00"}
+NAMES = {
+    "wb": "whole body (WB)",
+    "sm": "sensor points (SM)",
+    "wb_known": "WB, scene known",
+    "wb_memory": "WB, memory",
+}
 BANDS = ("#56B4E9", "#F0E442", "#CC79A7", "#E69F00", "#9BD8C2", "#B9B9E8", "#D9C6A5", "#C7C7C7")
 GREY = "#5A5A5A"
 DASHED: Any = (0, (4, 1.6))

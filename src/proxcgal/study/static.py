@@ -13,15 +13,18 @@ from proxcgal.sim.scenario import CONTROLLERS, Scenario, load_scenario
 from proxcgal.sim.setup import Setup
 from proxcgal.study.analysis import (
     CONTROLLER_KEYS,
+    COVERAGE_KEYS,
     NOTHING_M,
     SELF_LIMIT_M,
     Summary,
+    finite,
 )
 from proxcgal.study.bootstrap import median_interval
 from proxcgal.study.campaign import Campaign, Trial, plain
 from proxcgal.study.draws import draw_scene
 from proxcgal.study.jobs import Report
 from proxcgal.study.kind import Kind, Wishes
+from proxcgal.study.memory_share import memory_summary
 from proxcgal.study.paired import ends_of, pairs
 from proxcgal.study.static_words import captions, figures, listings, verdicts
 from proxcgal.study.store import Row
@@ -31,6 +34,8 @@ SCENES = ("front_plane", "side_plane")
 #: Of the trials under 0.05 m: the cloud's nearest point was this much farther away than the panel
 #: really was, when that was nearest.
 UNSEEN_M = 0.05
+#: Controllers whose closest points are looked up among what the sensors had in view.
+LOOKED_AT = ("wb", "wb_memory")
 _HELD = 2  # modes from here on: HOLD, STOP
 _AXES = ("x", "y", "z")
 _ANGLES = ("roll", "pitch", "yaw")
@@ -82,10 +87,12 @@ def plan(wishes: Wishes) -> Campaign:
 def perform(trial: Trial, report: Report) -> Row:
     """One trial's numbers, beside what was drawn for it."""
     log = simulate(
-        trial.scenario, trial.controller, trial.seed, report, robot_digest=trial.robot_digest
-    )
+        trial.scenario, trial.controller, trial.seed, report, robot_digest=trial.robot_digest,
+        coverage=trial.controller in LOOKED_AT,
+    )  # fmt: skip
     numbers = log.summary()
     row: Row = {key: numbers[key] for key in CONTROLLER_KEYS}
+    row |= {key: finite(share) for key, share in log.coverage.numbers().items()}
     nearest = int(np.nanargmin(log.true_m))
     row["true_min_link"] = log.true_link[nearest]
     row["seen_at_true_min_m"] = min(float(log.seen_m[nearest]), NOTHING_M)
@@ -111,14 +118,15 @@ def _drawn(scenario: Scenario) -> Row:
 
 def _columns(trial: Trial) -> tuple[str, ...]:
     own = ("true_min_link", "seen_at_true_min_m", "leaked_points_max", "held_ticks")
-    return (*CONTROLLER_KEYS, *own, *_drawn(trial.scenario))
+    return (*CONTROLLER_KEYS, *COVERAGE_KEYS, *own, *_drawn(trial.scenario))
 
 
 def analyse(table: pl.DataFrame, campaign: Campaign) -> Summary:
     """The numbers of `summary.json`: per scene and controller, and paired over the draws.
 
     `gain_mm` is the true distance at the end (mean of the last 2 s), wb over sm; `sensing_cost_mm`
-    the same, wb_known over wb. Each counts the draws that both of its controllers ended.
+    the same, wb_known over wb; `memory` how much of that wb_memory gives back. Each counts the
+    draws that all of its controllers ended.
     """
     scenes = {}
     for (scene,), own in table.group_by(["scene"], maintain_order=True):
@@ -132,6 +140,7 @@ def analyse(table: pl.DataFrame, campaign: Campaign) -> Summary:
             },
             "gain_mm": _paired(pairs(ends, "wb", "sm").apart_mm),
             "sensing_cost_mm": _paired(pairs(ends, "wb_known", "wb").apart_mm),
+            "memory": memory_summary(own),
         }
     return {
         "robot": campaign.trials[0].scenario.robot,
@@ -152,6 +161,10 @@ def _controller(part: pl.DataFrame) -> Summary:
         **{
             key: _spread(done[key].to_numpy())
             for key in ("true_min_m", "true_final_m", "goal_error_m")
+        },
+        "closest_points": {
+            key: done[key].mean() if done[key].null_count() < len(done) else None
+            for key in COVERAGE_KEYS
         },
         "violating_trials": len(close),
         "violating_share": len(close) / len(done),
@@ -192,7 +205,8 @@ KIND = Kind(
     introduction="Panels, start postures and goals drawn round the paper's static scenes; every "
     "controller meets the same draws, with the same noise of the sensors. wb moves the nearest "
     "point of the whole arm, sm only the sensors' mounting points; wb_known is wb on points of the "
-    "scene itself, the ceiling, not a result of ours.",
+    "scene itself, the ceiling, not a result of ours; wb_memory is wb that remembers what left the "
+    "sensors' view.",
     plan=plan, analyse=analyse, listings=listings, verdicts=verdicts, figures=figures,
     captions=captions, worst=worst,
 )  # fmt: skip

@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 
 from proxcgal.sim.trial_log import TOO_CLOSE
 from proxcgal.study.bootstrap import median_interval
-from proxcgal.study.figures import COLOURS, DPI, GREY, LEGEND, NAMES
+from proxcgal.study.figures import COLOURS, DASHED, DPI, GREY, LEGEND, NAMES
+from proxcgal.study.memory_share import MEASURES, WORSE_MM, Shares, shares
 from proxcgal.study.paired import Ends, Pairs, ends_of, pairs
 
 if TYPE_CHECKING:
@@ -44,16 +45,49 @@ def scene_figure(scene: str, table: pl.DataFrame) -> Figure:
     lines = [line for ax in axes[::2] for line in ax.get_legend_handles_labels()[0]]
     figure.legend(
         lines, [str(line.get_label()) for line in lines], loc="outside lower center",
-        ncols=len(lines), columnspacing=1.6, **LEGEND,
+        ncols=(len(lines) + 1) // 2, columnspacing=1.6, **LEGEND,
     )  # fmt: skip
     return figure
+
+
+def memory_figure(scene: str, table: pl.DataFrame) -> Figure:
+    """What memory regains over what sensing costs, per draw: at the end, and at the nearest.
+
+    Args:
+        scene: its name, above the figure.
+        table: its trials.
+    """
+    figure = Figure(figsize=(7.6, 3.9), dpi=DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    figure.suptitle(f"{scene}: memory against the cost of sensing", fontsize=12, fontweight="bold")
+    titles = ("(a) at the end", "(b) at the nearest")
+    for ax, measure, title in zip(figure.subplots(1, 2), MEASURES, titles, strict=True):
+        _regained(ax, shares(table, measure))
+        ax.set_title(title, loc="left", fontsize=10)
+        ax.tick_params(labelsize=9)
+        ax.spines[["top", "right"]].set_visible(False)
+    return figure
+
+
+def _regained(ax: Axes, of: Shares) -> None:
+    all_mm = [-WORSE_MM, 50.0, *of.lost, *of.regained]
+    low, high = min(all_mm) - 10.0, max(all_mm) + 10.0
+    ax.plot((low, high), (low, high), color=GREY, linewidth=1.0)
+    ax.axhline(0.0, color=GREY, linewidth=1.0)
+    ax.axhline(-WORSE_MM, color=GREY, linewidth=1.0, linestyle=_DOTTED)
+    ax.scatter(of.lost, of.regained, s=14, color=COLOURS["wb_memory"], alpha=0.6, linewidths=0.0)
+    ax.set_xlim(low, high)
+    ax.set_ylim(low, high)
+    ax.set_aspect("equal")
+    ax.set_xlabel("cost of sensing, known - WB [mm]", fontsize=10)
+    ax.set_ylabel("regained, memory - WB [mm]", fontsize=10)
 
 
 def _ends(ax: Axes, ends: Ends) -> None:
     for name, by_draw in ends.items():
         ax.ecdf(
             list(by_draw.values()), color=COLOURS.get(name, "black"), label=NAMES.get(name, name),
-            linewidth=1.6,
+            linewidth=1.6, linestyle=DASHED if name == "wb_memory" else "-",
         )  # fmt: skip
     ax.axvline(TOO_CLOSE, color=GREY, linewidth=1.0, linestyle=_DOTTED)
     ax.set_xlim(left=0.0)
@@ -76,6 +110,7 @@ def _differences(ax: Axes, ends: Ends) -> None:
     for one, other, colour, label in (
         ("wb", "sm", _GAIN, "gain, WB - SM"),
         ("wb_known", "wb", _COST, "cost of sensing, known - WB"),
+        ("wb_memory", "wb", COLOURS["wb_memory"], "memory - WB"),
     ):
         apart = pairs(ends, one, other).apart_mm
         interval = median_interval(apart)

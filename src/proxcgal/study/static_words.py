@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 from proxcgal.study.analysis import SELF_LIMIT_M, Summary, shown
 from proxcgal.study.campaign import plain
 from proxcgal.study.kind import Listing
-from proxcgal.study.static_figures import scene_figure
+from proxcgal.study.memory_share import memory_rows, memory_sentences
+from proxcgal.study.static_figures import memory_figure, scene_figure
 
 if TYPE_CHECKING:
     import polars as pl
@@ -16,10 +17,14 @@ if TYPE_CHECKING:
 
 def listings(summary: Summary) -> list[Listing]:
     """A row a controller and scene, then a row a comparison."""
-    rows, pairs = [], []
+    rows, pairs, seen, memory = [], [], [], []
     for scene, found in summary["scenes"].items():
         for name, numbers in found["controllers"].items():
             rows.append((scene, name, *_cells(numbers)))
+            shares = [*(numbers.get("closest_points") or {}).values()]
+            if shares and None not in shares:
+                seen.append((scene, name, *(f"{100.0 * share:.0f}" for share in shares)))
+        memory += memory_rows(scene, found["memory"])
         for name in ("gain_mm", "sensing_cost_mm"):
             pairs.append((scene, _COMPARISONS[name], *_pair_cells(found[name])))
     return [
@@ -40,6 +45,22 @@ def listings(summary: Summary) -> list[Listing]:
                    "above 0"),
             units=("", "", "", "mm", "mm", "mm", "mm", "mm", "%"),
             rows=pairs, left=2,
+        ),
+        Listing(
+            caption="What the sensors had of the truly closest points, mean over the draws: in "
+            "view at the last scan, within the memory's time before, longer ago, never.",
+            names=("scene", "controller", "in view", "remembered", "forgotten", "never seen"),
+            units=("", "", "%", "%", "%", "%"),
+            rows=seen, left=2,
+        ),
+        Listing(
+            caption="What memory gives back of what sensing costs, true distance: means over the "
+            "draws, share of the sums with its 95 % bootstrap interval, draws that it brings "
+            "nearer by more than 20 mm.",
+            names=("scene", "distance", "draws", "lost", "regained", "closed", "95 % from", "to",
+                   "worse"),
+            units=("", "", "", "mm", "mm", "%", "%", "%", "draws"),
+            rows=memory, left=2,
         ),
     ]  # fmt: skip
 
@@ -90,6 +111,7 @@ def verdicts(summary: Summary) -> list[str]:
                 f"trials, in {ours['unseen_trials']} of them unseen: the cloud showed nothing that "
                 "near."
             )
+        told += memory_sentences(scene, found["memory"])
         again = ", ".join(f"{reason} {count}" for reason, count in found["redrawn"].items())
         told.append(f"{scene}: {found['draws']} draws; drawn again: {again or 'none'}.")
     if summary["self_under_limit"]:
@@ -112,22 +134,37 @@ def _sureness(paired: Summary) -> str:
 
 
 def figures(table: pl.DataFrame) -> dict[str, Figure]:
-    """One a scene: distributions at the end, pairs, differences."""
-    return {
-        _file(str(scene)): scene_figure(str(scene), own)
-        for (scene,), own in table.group_by(["scene"], maintain_order=True)
-    }
+    """Two a scene: distributions at the end, pairs, differences; what memory gives back."""
+    drawn: dict[str, Figure] = {}
+    for (scene,), own in table.group_by(["scene"], maintain_order=True):
+        drawn[_file(str(scene))] = scene_figure(str(scene), own)
+        drawn[_memory_file(str(scene))] = memory_figure(str(scene), own)
+    return drawn
 
 
 def captions(summary: Summary) -> dict[str, str]:
     """What the figures show."""
-    return {_file(scene): f"{scene}: {_CAPTION}" for scene in summary["scenes"]}
+    told = {}
+    for scene in summary["scenes"]:
+        told[_file(scene)] = f"{scene}: {_CAPTION}"
+        told[_memory_file(scene)] = f"{scene}: {_MEMORY_CAPTION}"
+    return told
 
 
 def _file(scene: str) -> str:
     return f"{plain(scene)}.png"
 
 
+def _memory_file(scene: str) -> str:
+    return f"{plain(scene)}_memory.png"
+
+
+_MEMORY_CAPTION = (
+    "what memory gives back of what sensing costs, each draw a point: how much farther away "
+    "wb_memory stays than wb, over how much farther wb_known does. On the diagonal memory makes up "
+    "for all that sensing costs, on the level line for nothing; below the dotted line it brings "
+    "the arm nearer by more than 20 mm."
+)
 _CAPTION = (
     "random panels, start postures and goals. (a) Share of the draws that end nearer to the panel "
     "than a distance, per controller; dotted: 0.05 m, under which a tick is a violation. (b) Each "

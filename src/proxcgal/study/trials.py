@@ -32,6 +32,7 @@ def simulate(
     ticks: RecordedTicks = "all",
     robot_digest: str | None = None,
     without_truth: bool = False,
+    coverage: bool = False,
 ) -> TrialLog:
     """Runs a trial in a worker process.
 
@@ -44,6 +45,7 @@ def simulate(
         ticks: which of them the recording holds.
         robot_digest: of the robot that it must be; left out: any.
         without_truth: no true distances at all, without a recording.
+        coverage: tell what of the closest points was in view.
 
     Raises:
         ProxError: what of the scenario does not fit, another robot; the simulator warned.
@@ -57,12 +59,13 @@ def simulate(
         if recording is None:
             return run_trial(
                 scenario, controller, seed=seed, robot=robot, on_progress=report,
-                sparse_truth=True, without_truth=without_truth,
+                sparse_truth=True, without_truth=without_truth, coverage=coverage,
             )  # fmt: skip
         with Recorder(recording, ticks) as recorder:
             return run_trial(
-                scenario, controller, seed=seed, robot=robot, recorder=recorder, on_progress=report
-            )
+                scenario, controller, seed=seed, robot=robot, recorder=recorder,
+                on_progress=report, coverage=coverage,
+            )  # fmt: skip
 
 
 def robot_of(scenario: Scenario, digest: str | None = None) -> Robot:

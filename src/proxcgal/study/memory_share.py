@@ -1,0 +1,151 @@
+"""How much of what sensing costs a memory gives back, over the draws of one scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from proxcgal.study.analysis import NOTHING_M, Summary
+from proxcgal.study.bootstrap import ratio_interval
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+Array = NDArray[np.float64]
+
+WORSE_MM = 20.0  # nearer than without memory by more than this, a draw is listed
+_ANOTHER_WAY_M = 0.05  # goal errors so far apart are of two ways
+MEASURES = ("true_final_m", "true_min_m")
+
+
+@dataclass(frozen=True, slots=True)
+class Shares:
+    """One measure of the draws that wb, wb_known and wb_memory all ended, (n,) each [mm]."""
+
+    draws: tuple[int, ...]
+    lost: Array  # wb_known over wb: what sensing costs
+    regained: Array  # wb_memory over wb
+
+
+def shares(table: pl.DataFrame, measure: str) -> Shares:
+    """The draws of one scene's trials; those that failed, or see nothing, are left out.
+
+    Args:
+        table: a row a trial.
+        measure: one of MEASURES.
+    """
+    done = table.filter(pl.col("error").is_null(), pl.col(measure) < NOTHING_M)
+    ends = {
+        str(name): dict(part.select("draw", measure).iter_rows())
+        for (name,), part in done.group_by(["controller"], maintain_order=True)
+    }
+    wb, known, memory = (ends.get(name, {}) for name in ("wb", "wb_known", "wb_memory"))
+    draws = tuple(sorted(wb.keys() & known.keys() & memory.keys()))
+    return Shares(
+        draws,
+        np.array([1000.0 * (known[draw] - wb[draw]) for draw in draws]),
+        np.array([1000.0 * (memory[draw] - wb[draw]) for draw in draws]),
+    )
+
+
+def memory_summary(table: pl.DataFrame) -> Summary | None:
+    """Per measure the share of the loss that memory closes; and each draw that it makes worse.
+
+    The share is the sum of what is regained over the sum of what is lost, so that a draw without
+    loss counts as little as it should; its interval is a bootstrap over the draws.
+    """
+    found: Summary = {}
+    for measure in MEASURES:
+        of = shares(table, measure)
+        if not of.draws:
+            return None
+        interval = ratio_interval(of.regained, of.lost)
+        found[measure] = {
+            "pairs": len(of.draws),
+            "lost_mean_mm": float(of.lost.mean()),
+            "regained_mean_mm": float(of.regained.mean()),
+            "closed_share": interval.middle,
+            "low": interval.low,
+            "high": interval.high,
+            "worse": [
+                _worse(table, draw, measure, float(apart))
+                for draw, apart in zip(of.draws, of.regained, strict=True)
+                if apart < -WORSE_MM
+            ],
+        }
+    return found
+
+
+def _worse(table: pl.DataFrame, draw: int, measure: str, apart_mm: float) -> Summary:
+    own = table.filter(pl.col("draw") == draw)
+    wb, memory = (
+        own.filter(pl.col("controller") == name).row(0, named=True) for name in ("wb", "wb_memory")
+    )
+    return {
+        "draw": draw, "apart_mm": apart_mm, "wb_m": wb[measure], "wb_memory_m": memory[measure],
+        "reason": _reason(wb, memory),
+    }  # fmt: skip
+
+
+def _reason(wb: Summary, memory: Summary) -> str:
+    """What differs between the two trials, the first that does."""
+    if memory["held_ticks"] > wb["held_ticks"]:
+        return f"held for {memory['held_ticks']} ticks, against {wb['held_ticks']} without memory"
+    errors = memory["goal_error_m"], wb["goal_error_m"]
+    if abs(errors[0] - errors[1]) > _ANOTHER_WAY_M:
+        return f"another way: ends {errors[0]:.3f} m from the goal, against {errors[1]:.3f} m"
+    if memory["true_min_link"] != wb["true_min_link"]:
+        return f"{memory['true_min_link']} comes nearest, against {wb['true_min_link']}"
+    return (
+        f"the same way, pushed off by what is remembered: {memory['true_min_link']} comes nearest "
+        "in both"
+    )
+
+
+def memory_rows(scene: str, found: Summary | None) -> list[Sequence[str]]:
+    """A row a measure, for people."""
+    names = {"true_final_m": "at the end", "true_min_m": "least"}
+    if found is None:
+        return [(scene, name, "0", *"------") for name in names.values()]
+    return [
+        (
+            scene, names[measure], str(part["pairs"]), f"{part['lost_mean_mm']:+.1f}",
+            f"{part['regained_mean_mm']:+.1f}", *_percent(part), str(len(part["worse"])),
+        )
+        for measure, part in found.items()
+    ]  # fmt: skip
+
+
+def _percent(part: Summary) -> tuple[str, str, str]:
+    if part["closed_share"] is None:
+        return ("-", "-", "-")
+    middle, low, high = (100.0 * part[key] for key in ("closed_share", "low", "high"))
+    return f"{middle:.0f}", f"{low:.0f}", f"{high:.0f}"
+
+
+def memory_sentences(scene: str, found: Summary | None) -> list[str]:
+    """What memory closes, and each draw that it makes worse."""
+    if found is None:
+        return []
+    told = []
+    for measure, where in (("true_final_m", "at the end"), ("true_min_m", "at the nearest")):
+        part = found[measure]
+        if part["closed_share"] is None:
+            told.append(f"{scene}: {where} sensing costs nothing in the mean: no share to close.")
+            continue
+        percent = _percent(part)
+        told.append(
+            f"{scene}: {where} memory closes {percent[0]} % of what sensing costs (95 % interval "
+            f"{percent[1]} to {percent[2]} %; {part['regained_mean_mm']:+.1f} of "
+            f"{part['lost_mean_mm']:+.1f} mm in the mean of {part['pairs']} draws)."
+        )
+        told += [
+            f"{scene}, draw {case['draw']}: {where} nearer by {-case['apart_mm']:.0f} mm with "
+            f"memory: {case['reason']}."
+            for case in part["worse"]
+        ]
+    return told
