@@ -36,6 +36,7 @@ CPP_LAYER_OF = {
     "controller": "controller",
     "controller_config": "controller",
     "admittance": "controller",
+    "hand_guide": "controller",
     "python": "bindings",
 }
 # What stages take from one another: each entry is one type too many outside of `types`.

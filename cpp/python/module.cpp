@@ -5,6 +5,7 @@
 namespace nb = nanobind;
 
 void bind_geometry(nb::module_& m);
+void bind_capsule(nb::module_& m);
 void bind_robot(nb::module_& m);
 void bind_pipeline(nb::module_& m);
 void bind_solve(nb::module_& m);
@@ -12,6 +13,8 @@ void bind_task(nb::module_& m);
 void bind_command(nb::module_& m);
 void bind_config(nb::module_& m);
 void bind_controller(nb::module_& m);
+void bind_guard(nb::module_& m);
+void bind_guiding(nb::module_& m);
 
 namespace {
 
@@ -41,6 +44,7 @@ NB_MODULE(_core, m) {
   m.doc() = "The control loop of proxcgal: geometry, robot, pipeline, solver, tick.";
   nb::register_exception_translator(translate);
   bind_geometry(m);
+  bind_capsule(m);
   bind_robot(m);
   bind_pipeline(m);
   bind_solve(m);
@@ -48,4 +52,6 @@ NB_MODULE(_core, m) {
   bind_command(m);
   bind_config(m);
   bind_controller(m);
+  bind_guard(m);
+  bind_guiding(m);
 }

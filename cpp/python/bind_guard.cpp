@@ -1,0 +1,228 @@
+#include <nanobind/stl/pair.h>
+
+#include <utility>
+
+#include "proxcgal/safety/guard.hpp"
+#include "robot_arguments.hpp"
+
+namespace proxcgal::binding {
+namespace {
+
+using Pairs = std::vector<std::pair<std::string, std::string>>;
+
+constexpr std::pair<const char*, TorqueState> kStates[] = {
+    {"off", TorqueState::kOff}, {"on", TorqueState::kOn}, {"stopping", TorqueState::kStopping}};
+
+JointVector joints_or_none(nb::handle value, const char* name) {
+  if (value.is_none()) return {};
+  return vector_from(value, name, -1, Take::kConvert);
+}
+
+Pairs pairs_of(const std::vector<Contradiction>& found) {
+  Pairs pairs;
+  for (const Contradiction& each : found) pairs.emplace_back(each.item, each.text);
+  return pairs;
+}
+
+std::vector<std::string> violated(const SafetyOutput& out) {
+  std::vector<std::string> names;
+  for (int f = 0; f < kSafetyFunctions; ++f)
+    if ((out.violated >> static_cast<unsigned>(f) & 1U) != 0)
+      names.emplace_back(function_name(static_cast<SafetyFunction>(f)));
+  return names;
+}
+
+const GuardOutput& cycle(Guard& guard, double time, nb::handle q, nb::handle qd, bool reset,
+                         nb::handle human_velocity) {
+  const int n = guard.robot().n_q();
+  Vector3 human_W = Vector3::Zero();
+  if (!human_velocity.is_none())
+    human_W = vector_from(human_velocity, "human_velocity_W", 3, Take::kExact, false);
+  return guard.cycle(time, vector_from(q, "q", n, Take::kExact, false),
+                     vector_from(qd, "qd", n, Take::kExact, false), reset, human_W);
+}
+
+}  // namespace
+}  // namespace proxcgal::binding
+
+void bind_guard(nanobind::module_& m) {
+  using namespace proxcgal;           // NOLINT(google-build-using-namespace)
+  using namespace proxcgal::binding;  // NOLINT(google-build-using-namespace)
+  nb::class_<LinkCapsule>(m, "LinkCapsule", "The capsule of one link, in the link's frame.")
+      .def(
+          "__init__",
+          [](LinkCapsule* self, std::string name, int link, const Capsule& shape_L) {
+            new (self) LinkCapsule{std::move(name), link, shape_L};
+          },
+          "name"_a, "link"_a, "shape_L"_a,
+          "Args: name, for messages and lists; link, a row of link_names; shape_L.")
+      .def_ro("name", &LinkCapsule::name)
+      .def_ro("link", &LinkCapsule::link, "Row of link_names.")
+      .def_ro("shape_L", &LinkCapsule::shape_L);
+  nb::class_<IsoSeparation>(m, "IsoSeparation",
+                            "What the separation distance of ISO/TS 15066 is computed with.")
+      .def(
+          "__init__",
+          [](IsoSeparation* self, double human_speed, double reaction_time, double intrusion,
+             double human_uncertainty, double robot_uncertainty) {
+            new (self) IsoSeparation{human_speed, reaction_time, intrusion, human_uncertainty,
+                                     robot_uncertainty};
+          },
+          nb::kw_only(), "human_speed"_a = IsoSeparation{}.human_speed,
+          "reaction_time"_a = IsoSeparation{}.reaction_time,
+          "intrusion"_a = IsoSeparation{}.intrusion,
+          "human_uncertainty"_a = IsoSeparation{}.human_uncertainty,
+          "robot_uncertainty"_a = IsoSeparation{}.robot_uncertainty)
+      .def_ro("human_speed", &IsoSeparation::human_speed, "v_h [m/s]")
+      .def_ro("reaction_time", &IsoSeparation::reaction_time, "T_r [s]")
+      .def_ro("intrusion", &IsoSeparation::intrusion, "C [m]")
+      .def_ro("human_uncertainty", &IsoSeparation::human_uncertainty, "Z_d [m]")
+      .def_ro("robot_uncertainty", &IsoSeparation::robot_uncertainty, "Z_r [m]");
+  m.def("protective_distance", &protective_distance, "iso"_a, "robot_speed"_a, "stop_time"_a,
+        "Separation distance of ISO/TS 15066 [m] for constant speeds [m/s] and constant "
+        "deceleration over the stopping time [s].");
+  nb::class_<GuardConfig>(m, "GuardConfig",
+                          "What the guard of walk-through programming is set up with. "
+                          "Source: [WT] section 3.")
+      .def(
+          "__init__",
+          [](GuardConfig* self, std::vector<LinkCapsule> capsules, nb::handle q_reference,
+             double tcp_speed, nb::handle qd_max, nb::handle qdd_max, double stop_time,
+             double rest_speed, double period, double max_gap, double min_distance,
+             double max_velocity, std::vector<std::string> pairs, std::vector<std::string> ends,
+             double human_radius, double human_height, nb::handle human_offset, bool subtract_human,
+             const IsoSeparation& iso, std::vector<std::string> accept) {
+            GuardConfig config;
+            config.capsules = std::move(capsules);
+            config.q_reference = joints_or_none(q_reference, "q_reference");
+            config.tcp_speed = tcp_speed;
+            config.qd_max = joints_or_none(qd_max, "qd_max");
+            config.qdd_max = joints_or_none(qdd_max, "qdd_max");
+            config.timing = {stop_time, rest_speed, period, max_gap};
+            config.separation = {
+                {human_radius, human_height, vector3_from(human_offset, "human_offset")},
+                std::move(pairs),
+                std::move(ends),
+                min_distance,
+                max_velocity,
+                subtract_human,
+                iso};
+            config.accept = std::move(accept);
+            new (self) GuardConfig(std::move(config));
+          },
+          nb::kw_only(), "capsules"_a, "q_reference"_a, "tcp_speed"_a = GuardConfig{}.tcp_speed,
+          "qd_max"_a = nb::none(), "qdd_max"_a = nb::none(),
+          "stop_time"_a = SafetyTiming{}.stop_time, "rest_speed"_a = SafetyTiming{}.rest_speed,
+          "period"_a = SafetyTiming{}.period, "max_gap"_a = SafetyTiming{}.max_gap,
+          "min_distance"_a = SeparationConfig{}.min_distance,
+          "max_velocity"_a = SeparationConfig{}.max_velocity,
+          "pairs"_a = std::vector<std::string>{}, "ends"_a = std::vector<std::string>{},
+          "human_radius"_a = OperatorCapsule{}.radius, "human_height"_a = OperatorCapsule{}.height,
+          "human_offset"_a = Eigen::Vector3d(OperatorCapsule{}.offset_T),
+          "subtract_human"_a = false, "iso"_a = IsoSeparation{},
+          "accept"_a = std::vector<std::string>{})
+      .def_ro("tcp_speed", &GuardConfig::tcp_speed, "[m/s] xd_UB")
+      .def_ro("accept", &GuardConfig::accept, "Contradictions taken as they are, item by item.")
+      .def_prop_ro(
+          "stop_time", [](const GuardConfig& c) { return c.timing.stop_time; }, "[s] declared.")
+      .def_prop_ro(
+          "rest_speed", [](const GuardConfig& c) { return c.timing.rest_speed; }, "[rad/s]")
+      .def_prop_ro(
+          "min_distance", [](const GuardConfig& c) { return c.separation.min_distance; }, "[m]")
+      .def_prop_ro(
+          "max_velocity", [](const GuardConfig& c) { return c.separation.max_velocity; }, "[m/s]");
+  m.def(
+      "guard_contradictions",
+      [](const Robot& robot, const GuardConfig& config) {
+        return pairs_of(contradictions(robot, config));
+      },
+      "robot"_a, "config"_a,
+      "What contradicts what: (item as `accept` names it, a sentence with the numbers).");
+  nb::class_<Trip>(m, "Trip", "Why the torque was cut.")
+      .def_prop_ro("function", [](const Trip& t) { return function_name(t.function); })
+      .def_ro("time", &Trip::time, "[s]")
+      .def_ro("value", &Trip::value, "What was found.")
+      .def_ro("limit", &Trip::limit, "What is allowed.")
+      .def_ro("row", &Trip::row, "Joint or capsule concerned, -1 for none.");
+  nb::class_<GuardOutput>(m, "GuardOutput", "What one cycle of the guard found.")
+      .def_prop_ro(
+          "torque", [](const GuardOutput& o) { return o.safety.torque; },
+          "The STO signal: may the motors have torque?")
+      .def_prop_ro(
+          "state", [](const GuardOutput& o) { return choice_name(o.safety.state, kStates); },
+          "'off', 'on', 'stopping'.")
+      .def_prop_ro(
+          "violated", [](const GuardOutput& o) { return violated(o.safety); },
+          "Names of the functions that are violated in this cycle.")
+      .def_prop_ro(
+          "trip", [](const GuardOutput& o) { return o.safety.trip; }, "Of the last stop.")
+      .def_prop_ro(
+          "trips", [](const GuardOutput& o) { return o.safety.trips; }, "How many, so far.")
+      .def_prop_ro(
+          "stop_time", [](const GuardOutput& o) { return o.safety.stop_time; },
+          "[s] since the torque was cut, until rest.")
+      .def_prop_ro(
+          "overrun", [](const GuardOutput& o) { return o.safety.overrun; },
+          "Not at rest in the declared time, or moved under its brakes: no reset any more.")
+      .def_prop_ro(
+          "reset_refused", [](const GuardOutput& o) { return o.safety.reset_refused; },
+          "The button went down in this cycle, for nothing.")
+      .def_prop_ro(
+          "speed_ratio", [](const GuardOutput& o) { return o.safety.speed_ratio; },
+          "Largest |qd| / qd_UB.")
+      .def_prop_ro(
+          "acceleration_ratio", [](const GuardOutput& o) { return o.safety.acceleration_ratio; },
+          "Largest |qdd| / qdd_UB.")
+      .def_ro("tcp_speed", &GuardOutput::tcp_speed, "[m/s]")
+      .def_prop_ro(
+          "distance", [](const GuardOutput& o) { return o.separation.distance; },
+          "[m] least over the monitored pairs.")
+      .def_prop_ro(
+          "velocity", [](const GuardOutput& o) { return o.separation.velocity; },
+          "[m/s] relative, most over the links' ends, positive towards the operator.")
+      .def_prop_ro(
+          "protective_distance",
+          [](const GuardOutput& o) { return o.separation.protective_distance; },
+          "[m] ISO/TS 15066 at the relative velocity of this cycle.");
+  nb::class_<Guard>(m, "Guard",
+                    "Guard of walk-through programming, one call a cycle. Source: [WT] eqs. (1) "
+                    "to (4), Fig. 5.")
+      .def(nb::init<std::shared_ptr<const Robot>, GuardConfig>(), "robot"_a, "config"_a,
+           "Raises: ConfigError: settings out of bounds; contradictions that `accept` does not "
+           "name, one line each; names in `accept` where nothing is to be accepted.")
+      .def("cycle", &cycle, "time"_a, "q"_a, "qd"_a, "reset"_a = false,
+           "human_velocity_W"_a = nb::none(), nb::rv_policy::reference_internal,
+           "One cycle.\n\nArgs: time [s], the caller's monotonic clock; q, qd (n,) float64; "
+           "reset, the button: what counts is that it goes down; human_velocity_W (3,) [m/s].\n"
+           "Returns: the output, reused: copy what you keep.")
+      .def_prop_ro(
+          "qd_bounds", [](const Guard& g) { return Eigen::VectorXd(g.limits().qd); },
+          "(n,) [rad/s] of eq. (1).")
+      .def_prop_ro(
+          "qdd_bounds", [](const Guard& g) { return Eigen::VectorXd(g.limits().qdd); },
+          "(n,) [rad/s^2] of eq. (2).")
+      .def_prop_ro("config", &Guard::config)
+      .def_prop_ro(
+          "accepted", [](const Guard& g) { return pairs_of(g.accepted()); },
+          "Contradictions that are taken as they are: to be printed and logged.")
+      .def_prop_ro(
+          "monitored_pairs",
+          [](const Guard& g) {
+            std::vector<std::string> names;
+            for (const int row : g.separation().pairs())
+              names.push_back(g.separation().capsules()[static_cast<std::size_t>(row)].name);
+            return names;
+          },
+          "Capsules whose distance to the operator counts: to be printed at the start.")
+      .def_prop_ro(
+          "monitored_ends",
+          [](const Guard& g) {
+            std::vector<std::string> names;
+            for (const int row : g.separation().ends())
+              names.push_back(g.separation().capsules()[static_cast<std::size_t>(row)].name);
+            return names;
+          },
+          "Capsules whose far ends' velocity counts.")
+      .def_prop_ro("protective_distance", &Guard::protective_distance,
+                   "[m] ISO/TS 15066 at tcp_speed, beside min_distance.");
+}

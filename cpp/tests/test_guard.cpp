@@ -1,0 +1,262 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "allocations.hpp"
+#include "guards.hpp"
+#include "proxcgal/error.hpp"
+
+namespace proxcgal {
+namespace {
+
+using test::Random;
+
+SafetyLimits limits(double speed = 1.0, double acceleration = 3.0) {
+  return {1.3, JointVector::Constant(2, speed), JointVector::Constant(2, acceleration)};
+}
+
+/// Fine in every way, at rest.
+SafetyInput fine(double time, bool reset = false) {
+  SafetyInput input;
+  input.time = time;
+  input.qd = JointVector::Zero(2);
+  input.distance_ok = input.velocity_ok = input.finite = true;
+  input.distance = input.min_distance = 0.5;
+  input.reset = reset;
+  return input;
+}
+
+/// One whose torque is on, at `time`.
+SafetyLogic running(double time = 0.003) {
+  SafetyLogic logic(limits(), {});
+  logic.cycle(fine(time - 0.002));
+  logic.cycle(fine(time - 0.001, true));
+  EXPECT_TRUE(logic.cycle(fine(time)).torque);
+  return logic;
+}
+
+TEST(SafetyLogic, TorqueIsOffAtTheStartUntilTheResetGoesDown) {
+  SafetyLogic logic(limits(), {});
+  EXPECT_FALSE(logic.cycle(fine(0.000, true)).torque) << "a button that is down at the start";
+  EXPECT_FALSE(logic.cycle(fine(0.001, true)).torque);
+  EXPECT_FALSE(logic.cycle(fine(0.002, false)).torque);
+  EXPECT_TRUE(logic.cycle(fine(0.003, true)).torque);
+  EXPECT_TRUE(logic.cycle(fine(0.004, false)).torque);
+}
+
+TEST(SafetyLogic, EveryViolationCutsTheTorqueInItsOwnCycle) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const auto trips = [](SafetyFunction function, const auto& change) {
+    SafetyLogic logic = running();
+    SafetyInput input = fine(0.004);
+    change(input);
+    const SafetyOutput& out = logic.cycle(input);
+    EXPECT_FALSE(out.torque) << function_name(function);
+    EXPECT_EQ(out.state, TorqueState::kStopping);
+    EXPECT_EQ(function_name(out.trip.function), std::string(function_name(function)));
+    EXPECT_EQ(out.trips, 1);
+  };
+  trips(SafetyFunction::kInput, [](SafetyInput& in) { in.finite = false; });
+  trips(SafetyFunction::kCycle, [](SafetyInput& in) { in.time = 0.010; });
+  trips(SafetyFunction::kCycle, [](SafetyInput& in) { in.time = 0.003; });
+  trips(SafetyFunction::kTcpSpeed, [](SafetyInput& in) { in.tcp_speed = 1.301; });
+  trips(SafetyFunction::kTcpSpeed, [=](SafetyInput& in) { in.tcp_speed = nan; });
+  trips(SafetyFunction::kJointSpeed, [](SafetyInput& in) { in.qd[1] = -1.001; });
+  trips(SafetyFunction::kJointAcceleration, [](SafetyInput& in) { in.qd[0] = 0.004; });
+  trips(SafetyFunction::kDistance, [](SafetyInput& in) { in.distance_ok = false; });
+  trips(SafetyFunction::kRelativeVelocity, [](SafetyInput& in) { in.velocity_ok = false; });
+}
+
+TEST(SafetyLogic, AValueAtItsBoundIsFine) {
+  SafetyLogic logic = running();
+  SafetyInput input = fine(0.004);
+  input.tcp_speed = 1.3;
+  EXPECT_TRUE(logic.cycle(input).torque);
+}
+
+TEST(SafetyLogic, ResetIsRefusedWhileTheCauseIsThereOrTheArmMoves) {
+  SafetyLogic logic = running();
+  SafetyInput bad = fine(0.004);
+  bad.distance_ok = false;
+  logic.cycle(bad);
+  bad.time = 0.005;
+  bad.reset = true;
+  EXPECT_TRUE(logic.cycle(bad).reset_refused);
+  for (int i = 6; i < 20; ++i) EXPECT_FALSE(logic.cycle(fine(0.001 * i, true)).torque) << "held";
+  EXPECT_FALSE(logic.cycle(fine(0.020)).torque);
+  EXPECT_TRUE(logic.cycle(fine(0.021, true)).torque);
+}
+
+TEST(SafetyLogic, AStopLongerThanDeclaredLocksTheArm) {
+  SafetyLogic logic(limits(), {.stop_time = 0.05});
+  logic.cycle(fine(0.001));
+  logic.cycle(fine(0.002, true));
+  SafetyInput moving = fine(0.003);
+  moving.distance_ok = false;
+  moving.qd[0] = 0.002;
+  logic.cycle(moving);
+  for (int i = 4; i < 60; ++i) {
+    moving.time = 0.001 * i;
+    moving.qd[0] = 0.02;
+    logic.cycle(moving);
+  }
+  EXPECT_TRUE(logic.output().overrun);
+  logic.cycle(fine(0.060));
+  logic.cycle(fine(0.061));
+  EXPECT_FALSE(logic.cycle(fine(0.062, true)).torque);
+}
+
+TEST(SafetyLogic, AClockThatStandsStillDoesNotHideALongStop) {
+  SafetyLogic logic(limits(), {.stop_time = 0.05});
+  logic.cycle(fine(0.001));
+  logic.cycle(fine(0.002, true));
+  SafetyInput moving = fine(0.003);
+  moving.distance_ok = false;
+  for (int i = 0; i < 60; ++i) {
+    moving.qd[0] = 0.02;
+    logic.cycle(moving);
+  }
+  EXPECT_TRUE(logic.output().overrun);
+}
+
+/// 10^5 random sequences of inputs and resets, against a judge that knows only the rule.
+TEST(SafetyLogic, TorqueNeverReturnsByItself) {
+  Random random(7);
+  long resets = 0, cuts = 0;
+  for (int sequence = 0; sequence < 100000; ++sequence) {
+    SafetyLogic logic(limits(), {.stop_time = 0.02});
+    bool torque = false, button = true;
+    double time = 0.0;
+    JointVector qd_last = JointVector::Zero(2);
+    const double bad = random.uniform(0.0, 0.15), press = random.uniform(0.0, 0.9);
+    const auto chance = [&](double share) { return random.uniform(0.0, 1.0) < share; };
+    for (int i = 0; i < 40; ++i) {
+      time += chance(bad * 0.2) ? random.uniform(-0.01, 0.01) : 0.001;
+      SafetyInput input = fine(time, chance(press));
+      if (chance(0.3)) input.qd = JointVector::Constant(2, random.uniform(-0.02, 0.02));
+      if (chance(bad * 0.2)) input.qd = JointVector::Constant(2, random.uniform(-2.0, 2.0));
+      input.tcp_speed = chance(bad * 0.3) ? random.uniform(1.2, 1.5) : 0.5;
+      input.distance_ok = !chance(bad);
+      input.velocity_ok = !chance(bad * 0.5);
+      input.finite = !chance(bad * 0.2);
+      if (!input.finite) input.qd.setConstant(std::numeric_limits<double>::quiet_NaN());
+      const SafetyOutput& out = logic.cycle(input);
+      const bool down = input.reset && !button;
+      button = input.reset;
+      if (out.torque && !torque) {
+        ++resets;
+        ASSERT_TRUE(down) << "no reset went down";
+        ASSERT_EQ(out.violated, 0U) << "the cause is still there";
+        ASSERT_LE(input.qd.cwiseAbs().maxCoeff(), 0.01) << "the arm moves";
+      }
+      if (out.violated != 0U) ASSERT_FALSE(out.torque);
+      cuts += static_cast<long>(torque && !out.torque);
+      torque = out.torque;
+    }
+  }
+  EXPECT_GT(resets, 50000);  // else nothing was tried
+  EXPECT_GT(cuts, 20000);
+}
+
+TEST(Guard, BoundsAreEquationsOneAndTwo) {
+  const auto robot = test::arm();
+  const GuardConfig config = test::guard_config(*robot);
+  Posture posture = robot->make_posture();
+  robot->update(config.q_reference, posture);
+  Jacobian6 J;
+  robot->tool_jacobian(posture, J);
+  const JointVector qd_max = JointVector::Constant(6, 3.0), qdd_max = JointVector::Constant(6, 8.0);
+  const SafetyLimits found = basic_limits(*robot, config.q_reference, 1.3, qd_max, qdd_max, 0.35);
+  for (int k = 0; k < 6; ++k) {
+    const double lever = std::sqrt(J(0, k) * J(0, k) + J(1, k) * J(1, k) + J(2, k) * J(2, k));
+    const double qd = lever > 0.0 ? std::min(3.0, 1.3 / lever) : 3.0;
+    EXPECT_DOUBLE_EQ(found.qd[k], qd);
+    EXPECT_DOUBLE_EQ(found.qdd[k], std::min(8.0, qd / 0.35));
+  }
+}
+
+TEST(Guard, AJointThatDoesNotMoveTheToolKeepsItsMaximum) {
+  const auto robot = test::arm();
+  const JointVector straight = JointVector::Zero(6);  // the last joint's axis goes through the tool
+  const JointVector most = JointVector::Constant(6, 3.0);
+  EXPECT_DOUBLE_EQ(basic_limits(*robot, straight, 1.3, most, most, 0.35).qd[5], 3.0);
+}
+
+TEST(Guard, RefusesWhatContradictsItselfItemByItem) {
+  const auto robot = test::arm();
+  GuardConfig config = test::guard_config(*robot);
+  config.separation.min_distance = 0.40;
+  config.separation.pairs = {"link1", "link6"};
+  config.qdd_max = JointVector::Constant(6, 10.0);
+  config.qdd_max[5] = 1.0;
+  const auto told = [&]() -> std::string {
+    try {
+      const Guard guard(robot, config);
+      return "";
+    } catch (const ConfigError& error) {
+      return error.what();
+    }
+  };
+  const std::string all = told();
+  for (const char* item :
+       {"stopping_distance", "closing_distance", "joint_stop.joint6", "pair.link6"})
+    EXPECT_NE(all.find(item), std::string::npos) << all;
+  config.accept = {"stopping_distance", "closing_distance", "pair.link6"};
+  EXPECT_NE(told().find("joint_stop.joint6"), std::string::npos);
+  EXPECT_EQ(told().find("pair.link6"), std::string::npos);
+  config.accept.emplace_back("joint_stop.joint6");
+  EXPECT_EQ(told(), "");
+  EXPECT_EQ(Guard(robot, config).accepted().size(), 4U);
+  config.accept.emplace_back("pair.link1");
+  EXPECT_NE(told().find("accept names pair.link1"), std::string::npos);
+}
+
+TEST(Guard, PaperThresholdIsExactlyWhatItsSpeedNeeds) {
+  const auto robot = test::arm();
+  for (const Contradiction& each : contradictions(*robot, test::guard_config(*robot)))
+    EXPECT_EQ(each.item.find("distance"), std::string::npos) << each.text;
+}
+
+TEST(Guard, ProtectiveDistanceAgreesWithTheWorkedCheck) {
+  EXPECT_NEAR(protective_distance({1.6, 0.1, 0.2, 0.15, 0.0}, 1.0, 0.3), 1.24, 1e-12);
+}
+
+TEST(Guard, AnyNumberThatIsNotFiniteCutsTheTorque) {
+  const auto robot = test::arm();
+  GuardConfig config = test::guard_config(*robot);
+  config.separation.min_distance = 0.0;
+  config.timing.stop_time = 1.0;
+  config.accept = {"stopping_distance", "closing_distance"};
+  for (int place = 0; place < 13; ++place) {
+    Guard guard(robot, config);
+    JointVector q = JointVector::Constant(6, 0.3), qd = JointVector::Zero(6);
+    guard.cycle(0.000, q, qd, false);
+    ASSERT_TRUE(guard.cycle(0.001, q, qd, true).safety.torque);
+    double time = 0.002;
+    (place < 6    ? q[place]
+     : place < 12 ? qd[place - 6]
+                  : time) = std::numeric_limits<double>::quiet_NaN();
+    const GuardOutput& out = guard.cycle(time, q, qd, false);
+    EXPECT_FALSE(out.safety.torque);
+    EXPECT_EQ(out.safety.trip.function, SafetyFunction::kInput);
+  }
+}
+
+TEST(Guard, CycleAllocatesNothing) {
+  const auto robot = test::arm();
+  GuardConfig config = test::guard_config(*robot);
+  Guard guard(robot, config);
+  Random random(5);
+  JointVector q = test::posture(random, 6), qd = JointVector::Zero(6);
+  guard.cycle(0.0, q, qd, false);
+  const test::CountAllocations allocations;
+  for (int i = 1; i < 2000; ++i) {
+    q[i % 6] += 1e-4;
+    guard.cycle(0.001 * i, q, qd, i % 7 == 0);
+  }
+  EXPECT_EQ(allocations.count(), 0U);
+}
+
+}  // namespace
+}  // namespace proxcgal
