@@ -107,7 +107,7 @@ TEST(Capsule, ApproachSpeedIsPositiveTowardsTheAxis) {
   const Vector3 o = Vector3::Zero();
   EXPECT_DOUBLE_EQ(approach_speed(o, Vector3(0.5, 0, 0), upright), 0.5);
   EXPECT_DOUBLE_EQ(approach_speed(o, Vector3(-0.5, 2, 3), upright), -0.5);
-  EXPECT_EQ(approach_speed(Vector3(1, 0, 0.3), Vector3(1, 2, 3), upright), 0.0);  // on the axis
+  EXPECT_EQ(approach_speed(Vector3(1, 0, 0.3), Vector3(2, 3, 6), upright), 7.0);  // on the axis
 }
 
 }  // namespace

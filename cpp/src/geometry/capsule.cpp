@@ -6,6 +6,8 @@
 namespace proxcgal {
 namespace {
 
+constexpr double kOnAxis = 1e-9;  ///< [m] from the axis: nearer, rounding alone gives a direction
+
 /// A pair of points of the two axes, and how far they are apart.
 struct Candidate {
   double share_a = 0.0, share_b = 0.0;
@@ -81,8 +83,9 @@ double closing_speed(const CapsulePair& pair, const CapsuleMotion& a, const Caps
 }
 
 double approach_speed(const Vector3& point, const Vector3& velocity, const Capsule& to) {
-  const Vector3 nearest = to.at(nearest_share(point, to.start, to.end));
-  return (nearest - point).stableNormalized().dot(velocity);
+  const Vector3 way = to.at(nearest_share(point, to.start, to.end)) - point;
+  const double length = way.stableNorm();
+  return length > kOnAxis ? way.dot(velocity) / length : velocity.stableNorm();
 }
 
 }  // namespace proxcgal

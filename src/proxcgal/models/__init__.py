@@ -1,6 +1,8 @@
 """Robots and sensor layouts: from description files to what controller and simulator use."""
 
 from proxcgal.models.assembly import attach, attach_mesh
+from proxcgal.models.capsule_robot import CapsuleRobot, read_capsule_robot
+from proxcgal.models.capsules import fit_capsules
 from proxcgal.models.description import RobotDescription
 from proxcgal.models.mounts import MountCheck, MountChecks, check_mounts
 from proxcgal.models.read import read_description
@@ -10,13 +12,16 @@ from proxcgal.models.skins import ring_skin
 __all__ = [
     "MountCheck",
     "MountChecks",
+    "CapsuleRobot",
     "Robot",
     "RobotDescription",
     "attach",
     "attach_mesh",
     "check_mounts",
+    "fit_capsules",
     "list_robots",
     "load_robot",
+    "read_capsule_robot",
     "read_description",
     "ring_skin",
 ]

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from proxcgal.errors import ModelError
+from proxcgal.models.capsule_robot import CapsuleRobot, read_capsule_robot
 from proxcgal.models.description import Frame, RobotDescription
 from proxcgal.models.limits import LIMITS, Limits
 from proxcgal.models.read import read_description
@@ -43,10 +44,22 @@ def _kr150() -> RobotDescription:
     return _renamed(found, "kr150", "tool0", "tool0")
 
 
+def ga_ol() -> CapsuleRobot:
+    """The painting arm of [WT] as its capsules, masses and brakes; its lengths are ours."""
+    return read_capsule_robot(_GA_OL)
+
+
+def _ga_ol() -> RobotDescription:
+    return ga_ol().description(_GA_OL.name)
+
+
+_GA_OL = Path(__file__).with_name("ga_ol.toml")
+
 BUILTIN: dict[str, Builtin] = {
     "ur10e": Builtin("Universal Robots UR10e, 6 joints", _ur10e, LIMITS["ur10e"]),
     "panda": Builtin("Franka Emika Panda, 7 joints, no hand", _panda, LIMITS["panda"]),
     "kr150": Builtin("KUKA KR 150-2, 6 joints", _kr150, LIMITS["kr150"]),
+    "ga_ol": Builtin("painting arm of capsules, 6 joints, lengths and masses ours", _ga_ol, None),
 }
 
 

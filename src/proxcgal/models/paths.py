@@ -12,7 +12,7 @@ from proxcgal.errors import ModelError
 # A description may sit in such a folder of its package, with the meshes beside that folder.
 _DESCRIPTION_FOLDERS = {"urdf", "xacro", "robots", "robot", "mjcf", "xml", "model", "models"}
 
-SUFFIXES = (".urdf", ".xacro", ".xml", ".mjcf")
+SUFFIXES = (".urdf", ".xacro", ".xml", ".mjcf", ".toml")
 
 
 def is_robot_file(name: str | os.PathLike[str]) -> bool:

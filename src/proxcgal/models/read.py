@@ -10,6 +10,7 @@ from typing import Any
 from proxcgal.errors import ModelError
 from proxcgal.models import mjcf, urdf
 from proxcgal.models.cache import Cache
+from proxcgal.models.capsule_robot import read_capsule_robot
 from proxcgal.models.description import RobotDescription
 from proxcgal.models.paths import SUFFIXES, MeshFolders, is_robot_file
 from proxcgal.models.reading import WORLD, describe
@@ -29,7 +30,8 @@ def read_description(
     """Read a robot description with its meshes at full resolution.
 
     Args:
-        path: .urdf, .xacro, or .xml (URDF or MJCF, told apart by the outermost tag).
+        path: .urdf, .xacro, .xml (URDF or MJCF, told apart by the outermost tag), or .toml (a list
+            of capsules).
         package_dirs: folders that package:// paths and meshes may lie in.
         base: link whose frame is the world. By default `base_link` where no joint moves it, else
             the first link of a URDF, the world of an MJCF.
@@ -42,6 +44,8 @@ def read_description(
     path = Path(os.path.normpath(Path(path).absolute()))
     if not is_robot_file(path):
         raise ModelError(f"{path}: {', '.join(SUFFIXES)} are read, not '{path.suffix}'")
+    if path.suffix.lower() == ".toml":
+        return read_capsule_robot(path).description(str(path))
     folders = MeshFolders(path, package_dirs, packages)
     cache = Cache("description")
     key = [_VERSION, str(path), base, sorted((k, str(v)) for k, v in folders.packages.items()),

@@ -146,14 +146,14 @@ def load_robot(
     acceleration_limits: PerJoint | None = None,
     max_deviation: float = 0.002,
 ) -> Robot:
-    """Load a robot by its name, or from a URDF, xacro or MJCF file.
+    """Load a robot by its name, or from a URDF, xacro or MJCF file, or a list of capsules.
 
     The world is the frame of the robot's `base_link`. Limits are the user's where given, else those
     of the file or, for a robot known by name, of the table in `proxcgal.models.limits`; an
     acceleration limit that nobody gives is chosen such that full speed is reached in 0.4 s.
 
     Args:
-        name_or_path: a name of `list_robots()`, or a path to .urdf, .xacro or .xml.
+        name_or_path: a name of `list_robots()`, or a path to .urdf, .xacro, .xml or .toml.
         package_dirs: folders that hold the packages of package:// paths, or such packages.
         vertices_per_link: of the controller's mesh of each link, met within 10 %; None keeps the
             meshes as they are.

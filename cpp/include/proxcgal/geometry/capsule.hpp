@@ -43,7 +43,7 @@ CapsulePair closest(const Capsule& a, const Capsule& b);
 double closing_speed(const CapsulePair& pair, const CapsuleMotion& a, const CapsuleMotion& b);
 
 /// Velocity of a point projected on the direction to the axis of a capsule, [WT] 2.2 and Fig. 3:
-/// positive towards it. 0 on the axis itself, where there is no direction.
+/// positive towards it. On the axis itself, where there is no direction, all of the speed.
 /// @param velocity  of the point; less that of the capsule there, where both count [m/s]
 double approach_speed(const Vector3& point, const Vector3& velocity, const Capsule& to);
 

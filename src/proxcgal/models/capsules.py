@@ -1,0 +1,127 @@
+"""Capsules for links: as a mesh, and the other way round, fitted to one so that it lies inside."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from proxcgal._core import Capsule, LinkCapsule
+from proxcgal.models.triangles import Floats, Ints
+
+if TYPE_CHECKING:
+    from proxcgal.models.robots import Robot
+
+SEGMENTS, RINGS = 32, 8  # round the axis, and from the rim of a cap to its pole
+_ROUNDING = 1e-12  # [m] by which a fitted radius is widened, so that no vertex is outside by a bit
+_STEPS = (0.3, 0.1, 0.03, 0.01, 0.003, 0.001)  # of the search: share of the mesh's size, and [rad]
+
+
+def capsule_mesh(start: Floats, end: Floats, radius: float) -> tuple[Floats, Ints]:
+    """A closed surface of a capsule: vertices (v, 3) [m], all on it, and triangles (f, 3)."""
+    frame = _frame(end - start)
+    latitude = np.linspace(0.0, np.pi / 2, RINGS + 1)[:-1]
+    turn = 2 * np.pi * np.arange(SEGMENTS) / SEGMENTS
+    circle = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    rows = [(start, -np.sin(a), np.cos(a)) for a in latitude[::-1]]
+    rows += [(end, np.sin(a), np.cos(a)) for a in latitude]
+    if not np.any(start != end):  # a sphere: its rim stands once
+        rows.pop(RINGS)
+    rings = [
+        middle + radius * (high * frame[2] + wide * circle @ frame[:2])
+        for middle, high, wide in rows
+    ]
+    poles = np.stack([start - radius * frame[2], end + radius * frame[2]])
+    vertices = np.concatenate([*rings, poles])
+    here = np.arange(SEGMENTS)
+    there = (here + 1) % SEGMENTS
+    low, high = len(vertices) - 2, len(vertices) - 1
+    triangles = [np.stack([np.full(SEGMENTS, low), there, here], axis=1)]
+    for ring in range(len(rings) - 1):
+        a, b = ring * SEGMENTS + here, ring * SEGMENTS + there
+        c, d = a + SEGMENTS, b + SEGMENTS
+        triangles += [np.stack([a, b, d], axis=1), np.stack([a, d, c], axis=1)]
+    last = (len(rings) - 1) * SEGMENTS
+    triangles.append(np.stack([np.full(SEGMENTS, high), last + here, last + there], axis=1))
+    return vertices, np.concatenate(triangles).astype(np.int32)
+
+
+def fit_capsules(robot: Robot) -> list[LinkCapsule]:
+    """A capsule for each link of a robot, in its frame, that contains the link's full mesh.
+
+    Args:
+        robot: any, as `load_robot` gives it.
+
+    Returns:
+        one for each of `link_names`, under the link's name.
+    """
+    return [
+        LinkCapsule(name, row, fit_capsule(robot.full_mesh(name)[0]))
+        for row, name in enumerate(robot.link_names)
+    ]
+
+
+def fit_capsule(vertices: Floats) -> Capsule:
+    """A small capsule that contains these points, and with them every triangle between them.
+
+    Searched from the principal axes by small turns and shifts of the axis: it need not be the
+    smallest there is, but it contains them all.
+
+    Args:
+        vertices: (v, 3) [m], finite, at least one.
+    """
+    points = np.asarray(vertices, np.float64)
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    size = float(np.linalg.norm(np.ptp(points, axis=0)))
+    axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2] if size else np.eye(3)
+    best = min(
+        (_improved(points, middle, axis, size) for axis in axes), key=lambda found: found[0]
+    )
+    _, start, end, radius = best
+    return Capsule(start, end, radius)
+
+
+_Fit = tuple[float, Floats, Floats, float]
+
+
+def _improved(points: Floats, middle: Floats, axis: Floats, size: float) -> _Fit:
+    """The least volume that turning and shifting this axis leads to."""
+    best = _around(points, middle, axis)
+    for step in _STEPS:
+        moved = True
+        while moved:
+            moved = False
+            across = _frame(axis)[:2]
+            for side in (*across, *-across):
+                for other, direction in (
+                    (middle + step * size * side, axis), (middle, axis + step * side)
+                ):  # fmt: skip
+                    found = _around(points, other, direction)
+                    if found[0] < best[0] * (1 - 1e-6):
+                        best, middle, axis, moved = found, other, direction, True
+    return best
+
+
+def _around(points: Floats, middle: Floats, axis: Floats) -> _Fit:
+    """The least capsule on this line that contains the points, its volume first."""
+    axis = axis / np.linalg.norm(axis)
+    along = (points - middle) @ axis
+    across = np.linalg.norm(points - middle - along[:, None] * axis, axis=1)
+    radius = float(across.max()) + _ROUNDING
+    # A point may lie beyond the axis's ends by what the caps' roundness leaves at its height.
+    room = np.sqrt(np.maximum(radius**2 - across**2, 0.0))
+    low, high = float((along + room).min()), float((along - room).max())
+    if low > high:  # all of it is in one ball, round any point between
+        low = high = 0.5 * (low + high)
+    volume = np.pi * radius**2 * (high - low + 4 / 3 * radius)
+    return volume, middle + low * axis, middle + high * axis, radius
+
+
+def _frame(axis: Floats) -> Floats:
+    """(3, 3) rows of a right-handed frame, the last along the axis; upright for none."""
+    length = np.linalg.norm(axis)
+    z = axis / length if length > 0 else np.array([0.0, 0.0, 1.0])
+    helper = np.eye(3)[int(np.abs(z).argmin())]
+    x = np.cross(helper, z)
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(z, x), z])
