@@ -38,7 +38,7 @@ class Scenario(Section):
 
     name: str = Field("unnamed", description="left out in a file: the file's own name")
     description: str = Field("", description="one line, shown in lists")
-    kind: Literal["static"] = Field(description="what kind of scene this is")
+    kind: Literal["static", "walkthrough"] = Field(description="what kind of scene this is")
     robot: str = Field(description="a built-in robot's name, or a path to .urdf or .xml")
     package_dirs: tuple[str, ...] = Field(
         (), description="where package:// paths of the robot's file are looked up"
@@ -69,8 +69,11 @@ class Scenario(Section):
         return toml.write(self.model_dump(by_alias=True))
 
 
-#: The class of each `kind`.
-KINDS: dict[str, type[Scenario]] = {"static": Scenario}
+def kinds() -> dict[str, type[Scenario]]:
+    """The class of each `kind`."""
+    from proxcgal.sim.walk.keys import WalkScenario  # which is made from Scenario
+
+    return {"static": Scenario, "walkthrough": WalkScenario}
 
 
 def list_scenarios() -> dict[str, str]:
@@ -122,7 +125,7 @@ def _checked(table: dict[str, Any], origin: str, overrides: Sequence[str]) -> Sc
     for assignment in overrides:
         toml.override(table, assignment)
     kind = table.get("kind", "static")
-    model = KINDS.get(kind, Scenario) if isinstance(kind, str) else Scenario
+    model = kinds().get(kind, Scenario) if isinstance(kind, str) else Scenario
     try:
         return model.model_validate(_tuples(table))
     except ValidationError as error:

@@ -1,0 +1,112 @@
+"""The operator's hand on the handle: spring and damper, bounded, trembling, with a reaction time."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxcgal.sim.walk.keys import Hand as HandKeys
+from proxcgal.sim.walk.wish import Wish
+
+Array = NDArray[np.float64]
+
+_TREMOR_HZ = (8.0, 12.0)
+_TONES = 6  # sinusoids of random frequency and phase that make a tremor
+_LETTING_GO = 0.10  # [s] in which a hand that has noticed the stop lets go
+
+
+class Hand:
+    """Pulls the tool along a wished path; lets go once it has noticed that the arm has stopped."""
+
+    def __init__(self, keys: HandKeys, wish: Wish, start: Array, period: float, seed: int) -> None:
+        """Args: `start` (4, 4) T_WT where the path begins; the seed fixes the tremor."""
+        self._keys = keys
+        self._wish = wish
+        self._start = np.array(start)
+        self._period = period
+        self._delay = round(keys.reaction_time / period)
+        self._tremor = _tremor(len(wish) + self._delay, period, keys.tremor, seed)
+        self._stopped_for = 0
+        self._force = np.zeros(6)
+
+    @property
+    def cycles(self) -> int:
+        """From the signal to start until the path's end."""
+        return len(self._wish) + self._delay
+
+    def force(self, cycle: int, position: Array, rotation: Array, twist: Array) -> Array:
+        """What it does at the tool's origin (6,), in world [N], [N m].
+
+        Args:
+            cycle: since the signal to start.
+            position: (3,) of the tool [m].
+            rotation: (3, 3) R_WT.
+            twist: (6,) of the tool, linear first [m/s], [rad/s].
+        """
+        keys, wish = self._keys, self._wish
+        row = min(max(cycle - self._delay, 0), len(wish) - 1)
+        force = self._force
+        force[:3] = keys.stiffness * (self._start[:3, 3] + wish.position[row] - position)
+        force[:3] += keys.damping * (wish.velocity[row] - twist[:3])
+        force[:3] += self._tremor[min(cycle, len(self._tremor) - 1)]
+        wanted = _rotation(wish.turn[row]) @ self._start[:3, :3]
+        force[3:] = keys.turn_stiffness * _turn_between(rotation, wanted)
+        force[3:] += keys.turn_damping * (wish.spin[row] - twist[3:])
+        _bound(force[:3], keys.max_force)
+        _bound(force[3:], keys.max_torque)
+        if self._stopped_for > self._delay:
+            held = 1.0 - (self._stopped_for - self._delay) * self._period / _LETTING_GO
+            force *= max(held, 0.0)
+        return force
+
+    def feel_stop(self) -> None:
+        """The arm does not follow, for one more cycle."""
+        self._stopped_for += 1
+
+
+def _bound(vector: Array, most: float) -> None:
+    length = math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
+    if length > most:
+        vector *= most / length
+
+
+def _turn_between(here: Array, there: Array) -> Array:
+    """(3,) rotation vector from one orientation to another, to first order beyond small angles."""
+    axis = np.zeros(3)
+    for column in range(3):
+        a, b = here[:, column], there[:, column]
+        axis[0] += a[1] * b[2] - a[2] * b[1]
+        axis[1] += a[2] * b[0] - a[0] * b[2]
+        axis[2] += a[0] * b[1] - a[1] * b[0]
+    return 0.5 * axis
+
+
+def _rotation(vector: Array) -> Array:
+    """(3, 3) of a rotation vector [rad]."""
+    x, y, z = (float(v) for v in vector)
+    angle = math.sqrt(x * x + y * y + z * z)
+    if angle < 1e-12:
+        return np.eye(3)
+    x, y, z = x / angle, y / angle, z / angle
+    s, c = math.sin(angle), math.cos(angle)
+    v = 1.0 - c
+    return np.array(
+        (
+            (c + x * x * v, x * y * v - z * s, x * z * v + y * s),
+            (y * x * v + z * s, c + y * y * v, y * z * v - x * s),
+            (z * x * v - y * s, z * y * v + x * s, c + z * z * v),
+        )
+    )
+
+
+def _tremor(cycles: int, period: float, rms: float, seed: int) -> Array:
+    """(n, 3) [N] of 8 to 12 Hz."""
+    generator = np.random.default_rng([seed, 8])
+    time = period * np.arange(cycles)
+    hertz = generator.uniform(*_TREMOR_HZ, (_TONES, 3))
+    phase = generator.uniform(0.0, 2.0 * np.pi, (_TONES, 3))
+    tones = np.sin(2.0 * np.pi * hertz * time[:, None, None] + phase)
+    found: Array = rms * math.sqrt(2.0 / _TONES) * tones.sum(axis=1)
+    return found

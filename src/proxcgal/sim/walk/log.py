@@ -1,0 +1,146 @@
+"""One walk-through as arrays over its cycles, and its numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxcgal import _core
+from proxcgal.sim.physics import Physics, Truth
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trip:
+    """Why and when the torque was cut."""
+
+    cycle: int
+    time_s: float
+    function: str
+    value: float
+    limit: float
+
+
+@dataclass(eq=False)
+class WalkLog:
+    """What happened in each of n cycles; filled one by one, cut to length at the end."""
+
+    period: float  #: [s]
+    rest_speed: float  #: [rad/s] of every joint, at rest
+    time: Array  #: (n,) [s]
+    q: Array  #: (n, n_q) [rad] measured
+    qd: Array  #: (n, n_q) [rad/s] measured
+    tool_W: Array  #: (n, 3) [m]
+    force: Array  #: (n,) [N] of the hand
+    tcp_speed: Array  #: (n,) [m/s] by the guard
+    distance: Array  #: (n,) [m] by the guard
+    velocity: Array  #: (n,) [m/s] by the guard
+    protective_m: Array  #: (n,) [m] ISO/TS 15066 at that velocity
+    speed_ratio: Array  #: (n,) largest |qd| / qd_UB
+    acceleration_ratio: Array  #: (n,) largest |qdd| / qdd_UB
+    torque: NDArray[np.bool_]  #: (n,) the STO signal
+    true_tcp_speed: Array  #: (n,) [m/s] by the simulator, nan where not asked
+    true_distance: Array  #: (n,) [m]
+    true_velocity: Array  #: (n,) [m/s]
+    true_acceleration_ratio: Array  #: (n,)
+    trips: list[Trip] = field(default_factory=list)
+    overrun: bool = False
+    cycles: int = 0
+
+    @classmethod
+    def empty(cls, cycles: int, joints: int, period: float, rest_speed: float) -> WalkLog:
+        """Room for so many cycles."""
+        columns = {name: np.full(cycles, np.nan) for name in _COLUMNS}
+        return cls(
+            period=period, rest_speed=rest_speed, q=np.zeros((cycles, joints)),
+            qd=np.zeros((cycles, joints)), tool_W=np.zeros((cycles, 3)),
+            torque=np.zeros(cycles, np.bool_), **columns,
+        )  # fmt: skip
+
+    def add(
+        self,
+        time: float,
+        physics: Physics,
+        out: _core.GuardOutput,
+        force: Array | None,
+        truth: Truth | None,
+        qdd_bounds: Array,
+    ) -> None:
+        """One cycle more."""
+        k = self.cycles
+        self.time[k] = time
+        self.q[k] = physics.q
+        self.qd[k] = physics.qd
+        self.tool_W[k] = physics.tool_W
+        self.force[k] = 0.0 if force is None else np.sqrt(force[:3] @ force[:3])
+        self.tcp_speed[k] = out.tcp_speed
+        self.distance[k] = out.distance
+        self.velocity[k] = out.velocity
+        self.protective_m[k] = out.protective_distance
+        self.speed_ratio[k] = out.speed_ratio
+        self.acceleration_ratio[k] = out.acceleration_ratio
+        self.torque[k] = out.torque
+        self.overrun = self.overrun or out.overrun
+        if out.trips > len(self.trips):
+            trip = out.trip
+            self.trips.append(
+                Trip(cycle=k, time_s=trip.time, function=trip.function, value=trip.value,
+                     limit=trip.limit)
+            )  # fmt: skip
+        if truth is not None:
+            self.true_tcp_speed[k] = truth.tcp_speed
+            self.true_distance[k] = truth.distance
+            self.true_velocity[k] = truth.velocity
+            self.true_acceleration_ratio[k] = (np.abs(physics.acceleration) / qdd_bounds).max()
+        self.cycles += 1
+
+    def cut(self) -> WalkLog:
+        """Itself, without the cycles that did not come."""
+        for name in ("q", "qd", "tool_W", "torque", *_COLUMNS):
+            setattr(self, name, getattr(self, name)[: self.cycles])
+        return self
+
+    def stop_time_s(self) -> float | None:
+        """From the first trip to rest, as simulated [s]; None without a trip, inf without rest."""
+        if not self.trips:
+            return None
+        rest = np.abs(self.qd[self.trips[0].cycle :]).max(axis=1) <= self.rest_speed
+        # At rest and from then on: a stop is over when nothing moves any more.
+        moving = np.flatnonzero(~rest)
+        first = int(moving[-1]) + 1 if len(moving) else 0
+        return first * self.period if first < len(rest) else float("inf")
+
+    def stop_distance_m(self) -> float | None:
+        """Way of the tool from the first trip to rest [m]; None without a trip."""
+        if not self.trips:
+            return None
+        way = np.diff(self.tool_W[self.trips[0].cycle :], axis=0)
+        return float(np.linalg.norm(way, axis=1).sum())
+
+    def max_tcp_speed(self) -> float:
+        """While the torque was on [m/s]."""
+        return float(self.tcp_speed[self.torque].max(initial=0.0))
+
+    def summary(self) -> dict[str, Any]:
+        """What experiments report."""
+        stop = self.stop_time_s()
+        return {
+            "trips": [
+                {"time_s": t.time_s, "function": t.function, "value": t.value, "limit": t.limit}
+                for t in self.trips
+            ],
+            "stop_time_s": stop if stop is None or np.isfinite(stop) else None,
+            "stop_distance_m": self.stop_distance_m(),
+            "max_tcp_speed_mps": self.max_tcp_speed(),
+        }
+
+
+_COLUMNS = (
+    "time", "force", "tcp_speed", "distance", "velocity", "protective_m", "speed_ratio",
+    "acceleration_ratio", "true_tcp_speed", "true_distance", "true_velocity",
+    "true_acceleration_ratio",
+)  # fmt: skip

@@ -1,0 +1,84 @@
+"""Teaching: the hand pulls, the admittance follows, the guard watches, the arm has weight."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from proxcgal.sim.walk.hand import Hand
+from proxcgal.sim.walk.log import WalkLog
+from proxcgal.sim.walk.poses import PoseRecorder
+from proxcgal.sim.walk.setup import PERIOD, WalkSetup
+from proxcgal.sim.walk.wish import Wish
+
+RESET_AT, ENGAGE_AT, START_AT = 0.05, 0.10, 0.50  # [s] the button, the switch, the signal to start
+SETTLE = 0.8  # [s] after the path's end until the hand lets go
+AFTER_STOP = 0.6  # [s] that a stop is watched
+REACHED = 0.02  # [m] from where the path ends
+
+
+def teach(
+    setup: WalkSetup,
+    *,
+    seed: int,
+    recorder: PoseRecorder | None = None,
+    with_truth: bool = False,
+    on_progress: Callable[[float], None] | None = None,
+) -> WalkLog:
+    """Simulates one teaching until the path's end, or until a trip has stopped the arm.
+
+    Args:
+        setup: of the scenario.
+        seed: fixes the operator's tremor.
+        recorder: gets every pose; the caller closes it.
+        with_truth: ask the simulator too, in every cycle, what the guard should find.
+        on_progress: told the share that is done, 0 to 1, every 0.1 s simulated.
+
+    Raises:
+        ConfigError: a guard that contradicts itself.
+        SimulationError: MuJoCo warned.
+    """
+    scenario = setup.scenario
+    guard, guide, physics = setup.make_guard(), setup.make_guide(), setup.make_physics()
+    wish = Wish.of(scenario.legs, PERIOD)
+    start = np.array(setup.robot.tool_pose(setup.q0))
+    hand = Hand(scenario.hand, wish, start, PERIOD, seed)
+    begin = round(START_AT / PERIOD)
+    release = begin + hand.cycles + round(SETTLE / PERIOD)
+    cycles = min(release + round(SETTLE / PERIOD), round(scenario.duration / PERIOD))
+    log = WalkLog.empty(cycles, setup.robot.n_q, PERIOD, scenario.guard.rest_speed)
+    qdd_bounds = np.array(guard.qdd_bounds)
+    still, force = np.zeros(setup.robot.n_q), np.zeros(6)
+    last = cycles
+    for k in range(cycles):
+        time = k * PERIOD
+        out = guard.cycle(time, physics.q, physics.qd, time >= RESET_AT)
+        truth = (
+            physics.truth(setup.monitored_pairs, setup.monitored_ends) if with_truth else None
+        )
+        engaged = ENGAGE_AT <= time and k < release
+        if engaged:
+            force = hand.force(k - begin, physics.tool_W, physics.tool_R, physics.tool_twist())
+        else:
+            force[:] = 0.0
+        command = still
+        if out.torque:
+            command = guide.step(physics.q, force, engaged).qd
+        else:
+            guide.halt()
+            if out.trips:
+                hand.feel_stop()
+        log.add(time, physics, out, force, truth, qdd_bounds)
+        if recorder is not None:
+            recorder.write(time, physics.q, physics.tool_W, physics.tool_R, force, out.torque)
+        if out.trips and last == cycles:
+            last = min(k + round(AFTER_STOP / PERIOD), cycles)
+        physics.step(command, out.torque, force)
+        if on_progress is not None and k % 100 == 0:
+            on_progress(k / cycles)
+        if k >= last:
+            break
+    if on_progress is not None:
+        on_progress(1.0)
+    return log.cut()
