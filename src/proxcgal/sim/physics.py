@@ -7,6 +7,7 @@ the joints, after the time that theirs take.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -165,15 +166,14 @@ class Physics:
         )
         jacobian = np.empty((3, model.nv))
         fastest = -np.inf
-        half = model.geom_size[human, 1]
+        half = float(model.geom_size[human, 1])
         for name, end_L in ends:
             body = model.body(name).id
             point = data.xpos[body] + data.xmat[body].reshape(3, 3) @ end_L
             mujoco.mj_jac(model, data, jacobian, None, point, body)
-            nearest = human_W.copy()
-            nearest[2] += np.clip(point[2] - human_W[2], -half, half)
-            way = nearest - point
-            fastest = max(fastest, float(way @ (jacobian @ data.qvel) / np.linalg.norm(way)))
+            way = human_W - point
+            way[2] += min(max(point[2] - human_W[2], -half), half)
+            fastest = max(fastest, float(way @ (jacobian @ data.qvel)) / math.sqrt(way @ way))
         mujoco.mj_jacSite(model, data, jacobian, None, self._tool)
         return Truth(
             tcp_speed=float(np.linalg.norm(jacobian @ data.qvel)), distance=float(distance),

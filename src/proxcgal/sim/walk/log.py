@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from proxcgal import _core
 from proxcgal.sim.physics import Physics, Truth
+from proxcgal.sim.walk.keys import Guard
 
 Array = NDArray[np.float64]
 
@@ -31,6 +32,9 @@ class WalkLog:
 
     period: float  #: [s]
     rest_speed: float  #: [rad/s] of every joint, at rest
+    tcp_limit: float  #: [m/s]
+    distance_limit: float  #: [m]
+    velocity_limit: float  #: [m/s]
     time: Array  #: (n,) [s]
     q: Array  #: (n, n_q) [rad] measured
     qd: Array  #: (n, n_q) [rad/s] measured
@@ -46,17 +50,19 @@ class WalkLog:
     true_tcp_speed: Array  #: (n,) [m/s] by the simulator, nan where not asked
     true_distance: Array  #: (n,) [m]
     true_velocity: Array  #: (n,) [m/s]
+    true_speed_ratio: Array  #: (n,)
     true_acceleration_ratio: Array  #: (n,)
     trips: list[Trip] = field(default_factory=list)
     overrun: bool = False
     cycles: int = 0
 
     @classmethod
-    def empty(cls, cycles: int, joints: int, period: float, rest_speed: float) -> WalkLog:
-        """Room for so many cycles."""
+    def empty(cls, cycles: int, joints: int, period: float, keys: Guard) -> WalkLog:
+        """Room for so many cycles under a guard with these keys."""
         columns = {name: np.full(cycles, np.nan) for name in _COLUMNS}
         return cls(
-            period=period, rest_speed=rest_speed, q=np.zeros((cycles, joints)),
+            period=period, rest_speed=keys.rest_speed, tcp_limit=keys.tcp_speed,
+            distance_limit=keys.min_distance, velocity_limit=keys.max_velocity, q=np.zeros((cycles, joints)),
             qd=np.zeros((cycles, joints)), tool_W=np.zeros((cycles, 3)),
             torque=np.zeros(cycles, np.bool_), **columns,
         )  # fmt: skip
@@ -68,9 +74,9 @@ class WalkLog:
         out: _core.GuardOutput,
         force: Array | None,
         truth: Truth | None,
-        qdd_bounds: Array,
+        bounds: tuple[Array, Array],
     ) -> None:
-        """One cycle more."""
+        """One cycle more; `bounds` are qd_UB and qdd_UB, for what is true."""
         k = self.cycles
         self.time[k] = time
         self.q[k] = physics.q
@@ -95,7 +101,8 @@ class WalkLog:
             self.true_tcp_speed[k] = truth.tcp_speed
             self.true_distance[k] = truth.distance
             self.true_velocity[k] = truth.velocity
-            self.true_acceleration_ratio[k] = (np.abs(physics.acceleration) / qdd_bounds).max()
+            self.true_speed_ratio[k] = (np.abs(physics.qd) / bounds[0]).max()
+            self.true_acceleration_ratio[k] = (np.abs(physics.acceleration) / bounds[1]).max()
         self.cycles += 1
 
     def cut(self) -> WalkLog:
@@ -125,6 +132,35 @@ class WalkLog:
         """While the torque was on [m/s]."""
         return float(self.tcp_speed[self.torque].max(initial=0.0))
 
+    def truly_violated(self) -> NDArray[np.bool_]:
+        """(n,) cycles under torque in which the simulator itself finds a bound violated.
+
+        Its kinematics, distances and accelerations are MuJoCo's own; what differs from the guard's
+        by rounding alone does not count.
+        """
+        under_torque = np.r_[False, self.torque[:-1]]
+        found: NDArray[np.bool_] = under_torque & (
+            (self.true_tcp_speed > self.tcp_limit + _ROUNDING)
+            | (self.true_speed_ratio > 1.0 + _ROUNDING)
+            | (self.true_acceleration_ratio > 1.0 + _ROUNDING)
+            | (self.true_distance < self.distance_limit - _ROUNDING)
+            | (self.true_velocity > self.velocity_limit + _ROUNDING)
+        )
+        return found
+
+    def latency_cycles(self) -> int | None:
+        """From the first cycle that is truly violated to the trip; None without either."""
+        violated = np.flatnonzero(self.truly_violated())
+        return self.trips[0].cycle - int(violated[0]) if self.trips and len(violated) else None
+
+    def false_trip(self) -> bool:
+        """A trip in a cycle in which nothing is truly violated."""
+        return bool(self.trips) and not self.truly_violated()[self.trips[0].cycle]
+
+    def missed(self) -> bool:
+        """Something is truly violated and nothing trips."""
+        return not self.trips and bool(self.truly_violated().any())
+
     def summary(self) -> dict[str, Any]:
         """What experiments report."""
         stop = self.stop_time_s()
@@ -139,8 +175,9 @@ class WalkLog:
         }
 
 
+_ROUNDING = 1e-9
 _COLUMNS = (
     "time", "force", "tcp_speed", "distance", "velocity", "protective_m", "speed_ratio",
     "acceleration_ratio", "true_tcp_speed", "true_distance", "true_velocity",
-    "true_acceleration_ratio",
+    "true_speed_ratio", "true_acceleration_ratio",
 )  # fmt: skip

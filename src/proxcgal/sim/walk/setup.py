@@ -100,6 +100,18 @@ class WalkSetup:
         ends = {link.name: np.array(link.end) for link in self.arm.links}
         return tuple((name, ends[name]) for name in self.bounds.monitored_ends)
 
+    def slow(self) -> WalkSetup:
+        """The same under the hand-guiding rules; what no longer needs accepting is not accepted."""
+        slow = self.scenario.slow()
+        bare = slow.guard.model_copy(update={"accept": ()})
+        scenario = slow.model_copy(update={"guard": bare})
+        found = _core.guard_contradictions(
+            self.robot, WalkSetup(scenario, self.robot, self.arm, self.q0)._guard_config()
+        )
+        accept = tuple(item for item, _ in found if item in slow.guard.accept)
+        guard = slow.guard.model_copy(update={"accept": accept})
+        return WalkSetup.of(slow.model_copy(update={"guard": guard}), self.robot)
+
     def told(self) -> list[str]:
         """What a user must see at the start: monitored pairs, what was accepted, both distances."""
         guard, keys = self.bounds, self.scenario.guard

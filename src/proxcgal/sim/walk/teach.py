@@ -47,8 +47,8 @@ def teach(
     begin = round(START_AT / PERIOD)
     release = begin + hand.cycles + round(SETTLE / PERIOD)
     cycles = min(release + round(SETTLE / PERIOD), round(scenario.duration / PERIOD))
-    log = WalkLog.empty(cycles, setup.robot.n_q, PERIOD, scenario.guard.rest_speed)
-    qdd_bounds = np.array(guard.qdd_bounds)
+    log = WalkLog.empty(cycles, setup.robot.n_q, PERIOD, scenario.guard)
+    bounds = (np.array(guard.qd_bounds), np.array(guard.qdd_bounds))
     still, force = np.zeros(setup.robot.n_q), np.zeros(6)
     last = cycles
     for k in range(cycles):
@@ -69,7 +69,7 @@ def teach(
             guide.halt()
             if out.trips:
                 hand.feel_stop()
-        log.add(time, physics, out, force, truth, qdd_bounds)
+        log.add(time, physics, out, force, truth, bounds)
         if recorder is not None:
             recorder.write(time, physics.q, physics.tool_W, physics.tool_R, force, out.torque)
         if out.trips and last == cycles:
