@@ -27,7 +27,11 @@ if TYPE_CHECKING:
     from proxcgal.study.store import Outcome, Store
 
 #: Module that holds each kind as its `KIND`.
-KINDS = {"static": "proxcgal.study.static", "faults": "proxcgal.study.faults"}
+KINDS = {
+    "static": "proxcgal.study.static",
+    "faults": "proxcgal.study.faults",
+    "walkthrough": "proxcgal.study.walk",
+}
 if TYPE_CHECKING:
     KindName = str
 else:
@@ -43,6 +47,9 @@ class CampaignOptions:
     faults: every fault of docs/reliability.md while the arm moves, on two robots: is the mode
     right, how soon, does the arm recover?
 
+    walkthrough: random operators and paths guide the painting arm, a quarter of them within bounds;
+    does the guard trip at once and on nothing else, how does the arm stop?
+
     Every finished trial is kept at once: the same command goes on where it was interrupted, and
     more --runs go on where fewer ended. Writes trials.parquet (a row a trial), summary.json,
     figures, recordings of the worst and report.html to DIR.
@@ -51,6 +58,7 @@ class CampaignOptions:
       proxcgal campaign static --runs 100
       proxcgal campaign static --runs 20 --set controller.d_min=0.25 --out out/farther
       proxcgal campaign faults --runs 20
+      proxcgal campaign walkthrough --runs 200
       proxcgal campaign static --runs 1000 --cluster tcp://10.0.0.1:8786
     """
 

@@ -35,7 +35,8 @@ def write_report(folder: Path) -> Path:
     """Writes `report.html` of a folder of results, from what lies in it.
 
     Args:
-        folder: of one run, of several scenarios' runs (one sub-folder each), or of a timing grid.
+        folder: of one run, of several scenarios' runs (one sub-folder each), of a timing grid, a
+            campaign or a walk-through.
 
     Returns:
         Path of the page: at most 10 MB, pictures inside, nothing fetched from anywhere.
@@ -45,13 +46,16 @@ def write_report(folder: Path) -> Path:
     """
     from proxcgal.apps.campaign_page import campaign_page
     from proxcgal.apps.page import page
-    from proxcgal.apps.stored import read_campaign, read_runs, read_sweep
+    from proxcgal.apps.stored import read_campaign, read_runs, read_sweep, read_walk
     from proxcgal.apps.sweep_page import sweep_page
+    from proxcgal.apps.walk_page import walk_page
 
     if sweep := read_sweep(folder):
         text = sweep_page(sweep)
     elif campaign := read_campaign(folder):
         text = campaign_page(campaign)
+    elif walk := read_walk(folder):
+        text = walk_page(walk)
     else:
         text = page(*read_runs(folder))
     path = folder / "report.html"

@@ -120,8 +120,13 @@ def check(
     from proxcgal.sim.mounting import require_mounts
     from proxcgal.sim.setup import Setup
     from proxcgal.sim.source import SimulatedSource
+    from proxcgal.sim.walk.keys import WalkScenario
+    from proxcgal.sim.walk.setup import WalkSetup
     from proxcgal.sim.world import World
 
+    if isinstance(scenario, WalkScenario):
+        WalkSetup.of(scenario, robot)
+        return
     announce(f"setting up {scenario.name} (a robot's first time takes a while)", quiet=quiet)
     setup = Setup.of(scenario, robot)
     for controller in controllers:

@@ -22,6 +22,7 @@ from proxcgal.apps.options import (
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from proxcgal.sim.scenario import Scenario
     from proxcgal.study.analysis import Summary
 
 
@@ -36,6 +37,7 @@ class RunOptions:
       proxcgal run front_plane
       proxcgal run side_plane --controller wb sm --seed 3 --out out/side
       proxcgal run front_plane --set controller.d_min=0.25 simulation.dropout=0.1
+      proxcgal run walkthrough_overspeed
       proxcgal run my_scene.toml --robot my_arm.urdf --package-dir ~/robots
     """
 
@@ -81,6 +83,8 @@ def run_command(options: RunOptions, command: str) -> int:
         )
     workers = checked_workers(options.workers)
     scenario = load_scenario(options.scenario, overrides(options))
+    if scenario.kind == "walkthrough":
+        return _run_walkthrough(scenario, options, command)
     controllers = tuple(dict.fromkeys(options.controller))
     check(scenario, controllers, quiet=options.quiet)
     folder = options.out or Path("out") / scenario.name
@@ -93,6 +97,17 @@ def run_command(options: RunOptions, command: str) -> int:
         quiet=options.quiet,
     )
     return conclude(summaries, write_report(plan.folder))
+
+
+def _run_walkthrough(scenario: Scenario, options: RunOptions, command: str) -> int:
+    """A walk-through has no controllers to choose from, and one process does it."""
+    from proxcgal.apps.origin import origin
+    from proxcgal.apps.walkthrough import run_walkthrough
+    from proxcgal.sim.walk.keys import WalkScenario
+
+    assert isinstance(scenario, WalkScenario)
+    folder = options.out or Path("out") / scenario.name
+    return run_walkthrough(scenario, folder, origin(command), quiet=options.quiet)
 
 
 def overrides(options: RunOptions) -> list[str]:

@@ -129,7 +129,34 @@ class StoredCampaign:
     about: About
 
 
+@dataclass(frozen=True, slots=True)
+class StoredWalk:
+    """What a walk-through's folder holds."""
+
+    folder: Path
+    summary: dict[str, Any]
+    about: About
+    settings: str  # scenario.toml
+
+
 M = TypeVar("M", bound=BaseModel)
+
+
+def read_walk(folder: Path) -> StoredWalk | None:
+    """The walk-through of a folder; None where its summary is of something else.
+
+    Raises:
+        ConfigError: no such folder, no summary in it, or files that cannot be read; all problems.
+    """
+    made, settings, summary = (
+        folder / "run.json", folder / "scenario.toml", _json(folder / "summary.json")
+    )  # fmt: skip
+    if "trips" not in summary:
+        return None
+    return StoredWalk(
+        folder, summary, _model(About, made) if made.is_file() else About(),
+        settings.read_text(errors="replace") if settings.is_file() else "",
+    )  # fmt: skip
 
 
 def read_campaign(folder: Path) -> StoredCampaign | None:

@@ -30,7 +30,7 @@ class Trial:
     scenario: Scenario  # resolved: nothing is read again where it runs
     source: str  # the name or file that it was read from
     overrides: tuple[str, ...] = ()  # and changed by
-    controller: str
+    controller: str  # empty where the kind has none
     seed: int
     robot_digest: str | None = None  # of the robot that it was planned with
     tags: Mapping[str, Cell] = field(default_factory=dict)  # which one it is: columns of the table
@@ -44,12 +44,13 @@ class Trial:
     @property
     def name(self) -> str:
         """For people and files."""
-        return plain("-".join([*map(str, self.tags.values()), self.controller]))
+        return plain("-".join(filter(None, [*map(str, self.tags.values()), self.controller])))
 
     @property
     def command(self) -> str:
         """What a user types to repeat it."""
-        words = ["proxcgal", "run", self.source, "--controller", self.controller]
+        words = ["proxcgal", "run", self.source]
+        words += ["--controller", self.controller] if self.controller else []
         words += ["--seed", str(self.seed)]
         return shlex.join(words + (["--set", *self.overrides] if self.overrides else []))
 
