@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 SEGMENTS, RINGS = 32, 8  # round the axis, and from the rim of a cap to its pole
 _ROUNDING = 1e-12  # [m] by which a fitted radius is widened, so that no vertex is outside by a bit
+_TINY = 1e-300  # stands in for the square of no length
 _STEPS = (0.3, 0.1, 0.03, 0.01, 0.003, 0.001)  # of the search: share of the mesh's size, and [rad]
 
 
@@ -77,8 +78,11 @@ def fit_capsule(vertices: Floats) -> Capsule:
     best = min(
         (_improved(points, middle, axis, size) for axis in axes), key=lambda found: found[0]
     )
-    _, start, end, radius = best
-    return Capsule(start, end, radius)
+    _, start, end, _ = best
+    # The radius once more, from the ends as they are: nothing may be outside by a rounding.
+    share = np.clip((points - start) @ (end - start) / max((end - start) @ (end - start), _TINY), 0, 1)
+    apart = np.linalg.norm(points - start - share[:, None] * (end - start), axis=1)
+    return Capsule(start, end, float(apart.max()) + _ROUNDING)
 
 
 _Fit = tuple[float, Floats, Floats, float]
@@ -107,7 +111,7 @@ def _around(points: Floats, middle: Floats, axis: Floats) -> _Fit:
     axis = axis / np.linalg.norm(axis)
     along = (points - middle) @ axis
     across = np.linalg.norm(points - middle - along[:, None] * axis, axis=1)
-    radius = float(across.max()) + _ROUNDING
+    radius = float(across.max())
     # A point may lie beyond the axis's ends by what the caps' roundness leaves at its height.
     room = np.sqrt(np.maximum(radius**2 - across**2, 0.0))
     low, high = float((along + room).min()), float((along - room).max())

@@ -1,0 +1,305 @@
+"""Walk-throughs: taught by a simulated hand, watched, recorded, cleaned, played back."""
+
+import csv
+import io
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from proxcgal.errors import ConfigError, RecordingError
+from proxcgal.models.builtin import ga_ol
+from proxcgal.sim.physics import Physics
+from proxcgal.sim.scenario import load_scenario, parse_scenario
+from proxcgal.sim.walk.keys import Leg, WalkScenario
+from proxcgal.sim.walk.log import WalkLog
+from proxcgal.sim.walk.playback import check_start, play
+from proxcgal.sim.walk.poses import read_poses
+from proxcgal.sim.walk.setup import PERIOD, WalkSetup
+from proxcgal.sim.walk.stops import STRETCHED, worst_stops
+from proxcgal.sim.walk.taught import TaughtPath, clean, to_csv, to_trajectory, tool_positions
+from proxcgal.sim.walk.teach import teach
+from proxcgal.sim.walk.wish import Wish
+
+OWN = {
+    "walkthrough_overspeed": "tcp_speed",
+    "walkthrough_too_close": "distance",
+    "walkthrough_closing_fast": "relative_velocity",
+}
+#: One sweep at the process's speed, and back a little.
+SHORT = (
+    "leg=[{to = [0.0, -0.75, 0.0], speed = 0.6, ramp = 0.9}, "
+    "{to = [0.0, 0.75, 0.0], speed = 1.18, ramp = 0.9}]",
+)
+
+
+def setup_of(name: str, *changes: str) -> WalkSetup:
+    scenario = load_scenario(name, changes)
+    assert isinstance(scenario, WalkScenario)
+    return WalkSetup.of(scenario)
+
+
+@pytest.fixture(scope="module")
+def short() -> WalkSetup:
+    return setup_of("walkthrough_teach", *SHORT)
+
+
+@pytest.fixture(scope="module")
+def taught(short: WalkSetup) -> WalkLog:
+    return teach(short, seed=0, with_truth=True)
+
+
+@pytest.fixture(scope="module")
+def path(short: WalkSetup, taught: WalkLog) -> TaughtPath:
+    return clean(short.robot, taught.time, taught.q, step=0.004, tolerance=0.001)
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_a_violation_trips_first_on_its_own_function_and_stops_in_time(name: str) -> None:
+    setup = setup_of(name)
+    log = teach(setup, seed=0, with_truth=True)
+    assert [trip.function for trip in log.trips] == [OWN[name]]
+    assert log.latency_cycles() in (0, 1)
+    assert not log.false_trip()
+    stop = log.stop_time_s()
+    assert stop is not None
+    assert stop <= setup.scenario.guard.stop_time
+    after = log.torque[log.trips[0].cycle :]
+    assert not after.any()  # torque never comes back by itself
+    assert not log.overrun
+
+
+def test_a_compliant_teaching_reaches_the_process_speed_without_a_trip(taught: WalkLog) -> None:
+    assert taught.trips == []
+    assert taught.max_tcp_speed() >= 1.1
+    assert not taught.truly_violated().any()
+
+
+def test_guard_agrees_with_the_simulators_own_kinematics(taught: WalkLog) -> None:
+    np.testing.assert_allclose(taught.tcp_speed, taught.true_tcp_speed, atol=1e-12)
+    np.testing.assert_allclose(taught.distance, taught.true_distance, atol=1e-12)
+    np.testing.assert_allclose(taught.velocity, taught.true_velocity, atol=1e-12)
+    ratio, true = taught.acceleration_ratio[2:], taught.true_acceleration_ratio[2:]
+    np.testing.assert_allclose(ratio, true, atol=1e-8)
+
+
+def test_the_same_seed_teaches_the_same_bit_for_bit(short: WalkSetup, taught: WalkLog) -> None:
+    assert teach(short, seed=0).q.tobytes() == taught.q.tobytes()
+
+
+def test_playback_follows_within_2_mm_rms(short: WalkSetup, path: TaughtPath) -> None:
+    played = play(short, path)
+    assert played.log.trips == []
+    assert np.sqrt((played.error_m**2).mean()) <= 0.002
+
+
+def test_a_slower_playback_takes_as_much_longer(short: WalkSetup, path: TaughtPath) -> None:
+    slow = setup_of("walkthrough_teach", *SHORT, "playback.scale=2.0")
+    assert play(slow, path).time_s == pytest.approx(2 * path.duration)
+
+
+def test_a_playback_too_fast_for_the_guard_is_slowed_down(
+    short: WalkSetup, path: TaughtPath
+) -> None:
+    hurried = setup_of("walkthrough_teach", *SHORT, "playback.scale=0.2")
+    played = play(hurried, path)
+    assert played.scale > 0.5
+    assert played.log.trips == []
+
+
+def test_playback_refuses_to_begin_elsewhere(short: WalkSetup, path: TaughtPath) -> None:
+    q = path.q[0] + [0.01, 0.0, 0.0, 0.0, 0.0, 0.0]
+    with pytest.raises(ConfigError, match=r"mm from the path's start; playback.start_tolerance"):
+        check_start(short.robot, q, path, 0.005)
+    check_start(short.robot, path.q[0], path, 0.005)
+
+
+@pytest.mark.parametrize("tolerance", [0.0005, 0.002])
+def test_cleaning_moves_the_tool_by_no_more_than_its_tolerance(
+    short: WalkSetup, taught: WalkLog, tolerance: float
+) -> None:
+    found = clean(short.robot, taught.time, taught.q, step=0.004, tolerance=tolerance)
+    moved = tool_positions(short.robot, found.at(found.raw_time)[0]) - found.raw_tool_W
+    assert np.linalg.norm(moved, axis=1).max() == pytest.approx(found.deviation_m)
+    assert found.deviation_m <= tolerance
+    assert found.window_s > 0.0
+
+
+def test_a_cleaned_path_gives_its_samples_and_the_derivative_between(path: TaughtPath) -> None:
+    np.testing.assert_allclose(path.at(path.time)[0], path.q, atol=1e-12)
+    times = np.linspace(0.1, path.duration - 0.1, 50)
+    slope = (path.at(times + 1e-6)[0] - path.at(times - 1e-6)[0]) / 2e-6
+    np.testing.assert_allclose(path.at(times)[1], slope, atol=1e-5)
+
+
+def test_exports_hold_the_path(short: WalkSetup, path: TaughtPath) -> None:
+    rows = list(csv.DictReader(io.StringIO(to_csv(short.robot, path))))
+    assert len(rows) == len(path.time)
+    row = rows[len(rows) // 2]
+    q = np.array([float(row[f"{name}_rad"]) for name in short.robot.joint_names])
+    T = np.array(short.robot.tool_pose(q))
+    np.testing.assert_allclose([float(row[f"{a}_m"]) for a in "xyz"], T[:3, 3], atol=1e-6)
+    x, y, z, w = (float(row[f"q{a}"]) for a in "xyzw")
+    third = [2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)]
+    np.testing.assert_allclose(third, T[:3, 2], atol=1e-6)
+    trajectory = json.loads(json.dumps(to_trajectory(short.robot, path)))
+    assert trajectory["joint_names"] == list(short.robot.joint_names)
+    np.testing.assert_allclose([p["positions_rad"] for p in trajectory["points"]], path.q)
+
+
+_TEACH = """
+import sys
+from proxcgal.sim.scenario import load_scenario
+from proxcgal.sim.walk.poses import PoseRecorder
+from proxcgal.sim.walk.setup import WalkSetup
+from proxcgal.sim.walk.teach import teach
+setup = WalkSetup.of(load_scenario("walkthrough_teach"))
+with PoseRecorder(sys.argv[1], {"seed": "0"}) as recorder:
+    teach(setup, seed=0, recorder=recorder)
+"""
+
+
+def test_every_pose_written_before_a_kill_can_be_read(tmp_path: Path) -> None:
+    file = tmp_path / "taught.mcap"
+    process = subprocess.Popen([sys.executable, "-c", _TEACH, str(file)])
+    while not file.exists() or file.stat().st_size < 200_000:
+        assert process.poll() is None
+        time.sleep(0.02)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    poses = read_poses(file)
+    assert poses.damage is not None
+    assert len(poses.time) >= 100
+    np.testing.assert_allclose(np.diff(poses.time), PERIOD, atol=1e-12)
+
+
+def test_a_file_that_holds_no_teaching_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "other.mcap").write_bytes(b"\x89MCAP0\r\n")
+    with pytest.raises(RecordingError, match="holds no poses"):
+        read_poses(tmp_path / "other.mcap")
+
+
+def test_wished_legs_go_from_rest_to_rest_and_no_faster_than_said() -> None:
+    legs = (
+        Leg(to=(0.0, 1.0, 0.0), speed=0.8, ramp=0.4),
+        Leg(to=(0.0, 1.0, 0.0), turn=(0.0, 0.5, 0.0), speed=0.8, turn_speed=0.3),
+    )
+    wish = Wish.of(legs, PERIOD)
+    assert np.linalg.norm(wish.velocity, axis=1).max() == pytest.approx(0.8)
+    assert np.linalg.norm(wish.spin, axis=1).max() == pytest.approx(0.3)
+    np.testing.assert_allclose(wish.position[-1], (0.0, 1.0, 0.0), atol=1e-12)
+    np.testing.assert_allclose(wish.turn[-1], (0.0, 0.5, 0.0), atol=1e-12)
+    np.testing.assert_allclose(
+        np.diff(wish.position, axis=0)[:-1] / PERIOD, wish.velocity[1:-1], atol=5e-3
+    )
+
+
+def test_brakes_hold_twice_what_the_stretched_arm_weighs() -> None:
+    arm = ga_ol()
+    physics = Physics(arm, np.array(STRETCHED), payload=5.0)
+    static = np.abs(physics._data.qfrc_bias)
+    brakes = np.array([link.brake for link in arm.moving])
+    assert (brakes >= 1.99 * static).all()
+
+
+def test_an_arm_without_torque_falls_until_its_brakes_close_and_then_holds() -> None:
+    physics = Physics(ga_ol(), np.array(STRETCHED))
+    for _ in range(500):
+        physics.step(np.zeros(6), True)
+    height = float(physics.tool_W[2])
+    speed = []
+    for _ in range(1000):
+        physics.step(np.zeros(6), False)
+        speed.append(float(np.abs(physics.qd).max()))
+    assert max(speed[:50]) > 0.05  # 30 ms pass before brakes begin to close
+    assert speed[-1] < 1e-3
+    assert 0.0 < height - physics.tool_W[2] < 0.10
+
+
+def test_weaker_brakes_stop_later(short: WalkSetup) -> None:
+    times = [stop.stop_time_s for stop in worst_stops(short)]
+    assert times == sorted(times, reverse=True)
+    assert times[1] <= 0.35
+
+
+def test_the_preset_of_the_hand_guiding_rules_takes_longer(short: WalkSetup) -> None:
+    slow = teach(setup_of("walkthrough_teach", *SHORT).slow(), seed=0)
+    assert slow.trips == []
+    assert slow.max_tcp_speed() <= 0.25
+    assert slow.cycles > 1.5 * teach(short, seed=0).cycles
+
+
+def test_a_contradiction_is_refused_unless_the_file_accepts_it() -> None:
+    with pytest.raises(ConfigError) as caught:
+        setup_of("walkthrough_teach", "guard.accept=[]", "guard.min_distance=0.4")
+    lines = str(caught.value).splitlines()
+    for item in ("stopping_distance", "closing_distance", "joint_stop.joint_4"):
+        assert any(f'accept = ["{item}"]' in line for line in lines), item
+    assert all(line.startswith("scenario walkthrough_teach: guard: ") for line in lines)
+
+
+def test_a_pair_that_is_always_violated_is_refused() -> None:
+    with pytest.raises(ConfigError, match=r"tool is at most .* m from the operator's capsule"):
+        setup_of("walkthrough_teach", 'guard.pairs=["link_2", "tool"]')
+
+
+def test_what_is_monitored_accepted_and_missing_is_told(short: WalkSetup) -> None:
+    told = "\n".join(short.told())
+    assert "distance to the operator: link_1, link_2, link_3, link_4" in told
+    assert "accepted joint_stop.joint_6" in told
+    assert "ISO/TS 15066 would be 0.98 m" in told
+
+
+def test_a_scenario_survives_being_written_and_read(short: WalkSetup) -> None:
+    text = short.scenario.to_toml()
+    assert parse_scenario(text, "text") == short.scenario
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ("robot=ur10e", "with weight and brakes: 'ga_ol'"),
+        ("q0=[0, 0]", "joint_1, joint_2"),
+        ("skin.rings=[]", "a walk-through has no such table"),
+        ("hand.stiffness=-1.0", "hand.stiffness"),
+        ("guard.pairs=['link_9']", "must be one of link_1, link_2"),
+    ],
+)
+def test_bad_input_is_told_in_one_line(change: str, told: str) -> None:
+    with pytest.raises(ConfigError, match=told):
+        setup_of("walkthrough_teach", change)
+
+
+def test_a_run_writes_what_the_experiment_asks_for(call: Callable[..., object]) -> None:
+    answer = call("run", "walkthrough_overspeed", "--quiet")
+    assert answer.code == 0, answer.err
+    folder = Path("out/walkthrough_overspeed")
+    summary = json.loads((folder / "summary.json").read_text())
+    keys = {"scenario", "trips", "stop_time_s", "stop_distance_m", "playback_error_m",
+            "max_tcp_speed_mps"}  # fmt: skip
+    assert keys <= summary.keys()
+    assert summary["trips"][0].keys() >= {"time_s", "function", "value", "limit"}
+    assert {s["brake_scale"] for s in summary["stops"]} == {0.7, 1.0, 1.3}
+    files = {path.name for path in folder.iterdir()}
+    assert files >= {"walkthrough.png", "taught.mcap", "scenario.toml", "run.json", "report.html"}
+    assert "tcp_speed" in (folder / "report.html").read_text()
+
+
+def test_a_campaign_draws_the_same_operators_again_and_finds_no_false_trip(
+    call: Callable[..., object],
+) -> None:
+    answer = call("campaign", "walkthrough", "--runs", "4", "--workers", "1", "--quiet")
+    assert answer.code == 0, answer.err
+    summary = json.loads(Path("out/campaign-walkthrough/summary.json").read_text())
+    assert summary["false_trips"] == summary["missed"] == summary["overruns"] == 0
+    assert {name: found["own_function"] for name, found in summary["wishes"].items()} == {
+        "compliant": 1, "overspeed": 1, "too_close": 1, "closing_fast": 1,
+    }  # fmt: skip
+    assert summary["stop_time_s"]["max"] <= 0.35
