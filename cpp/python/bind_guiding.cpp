@@ -59,6 +59,13 @@ void bind_guiding(nanobind::module_& m) {
           "force"_a, "engaged"_a, "dt"_a,
           "One cycle: the mean velocity over it (6,), linear first, in world.\n\n"
           "Args: force (6,) at the handle [N], [N m]; engaged, the hand's switch; dt [s].")
+      .def(
+          "held_to",
+          [](Admittance& a, nb::handle achieved) {
+            a.held_to(vector6_from(achieved, "achieved"));
+          },
+          "achieved"_a,
+          "What became of the last step's velocity (6,): axes that were held back lose the energy.")
       .def_prop_ro(
           "velocity", [](const Admittance& a) { return Vector6(a.velocity()); },
           "(6,) at the end of the cycle.")

@@ -4,6 +4,11 @@
 namespace proxcgal::binding {
 namespace {
 
+constexpr std::pair<const char*, ReachRows> kReachRows[] = {
+    {"both", ReachRows::kBoth},
+    {"position", ReachRows::kPosition},
+    {"orientation", ReachRows::kOrientation}};
+
 template <class Spec>
 void construct(Spec* self, const Spec& spec) {
   spec.validate();
@@ -37,14 +42,18 @@ void bind_task(nanobind::module_& m) {
       "Bring the tool to the goal, both rates saturated. Source: [WA] eqs. (8) to (10).")
       .def(
           "__init__",
-          [](Reach* self, double gain, double max_linear, double max_angular) {
-            construct(self, {gain, max_linear, max_angular});
+          [](Reach* self, double gain, double max_linear, double max_angular,
+             const std::string& rows) {
+            construct(self, {gain, max_linear, max_angular, choice(rows, "Reach.rows", kReachRows)});
           },
           nb::kw_only(), "gain"_a = Reach{}.gain, "max_linear"_a = Reach{}.max_linear,
-          "max_angular"_a = Reach{}.max_angular, raises)
+          "max_angular"_a = Reach{}.max_angular, "rows"_a = "both", raises)
       .def_rw("gain", &Reach::gain, "[1/s] lambda.")
       .def_rw("max_linear", &Reach::max_linear, "[m/s]")
-      .def_rw("max_angular", &Reach::max_angular, "[rad/s]");
+      .def_rw("max_angular", &Reach::max_angular, "[rad/s]")
+      .def_prop_ro(
+          "rows", [](const Reach& r) { return choice_name(r.rows, kReachRows); },
+          "'both' in one level, or 'position' or 'orientation' alone.");
   nb::class_<JointLimits>(m, "JointLimits", "Keep every joint off its position limits.")
       .def(
           "__init__",

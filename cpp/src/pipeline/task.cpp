@@ -137,6 +137,9 @@ const char* task_name(const TaskSpec& spec) {
   constexpr const char* names[] = {"avoidance", "reach", "joint_limits", "minimum_altitude",
                                    "manipulability"};
   static_assert(std::size(names) == std::variant_size_v<TaskSpec>);
+  const auto* reach = std::get_if<Reach>(&spec);
+  if (reach != nullptr && reach->rows == ReachRows::kPosition) return "reach_position";
+  if (reach != nullptr && reach->rows == ReachRows::kOrientation) return "reach_orientation";
   return names[spec.index()];
 }
 
@@ -175,15 +178,18 @@ void build_avoidance(const Avoidance& spec, const Robot& robot, const Posture& p
 
 void build_reach(const Reach& spec, const Robot& robot, const Posture& posture, const Pose& goal_WT,
                  BuiltTask& out) {
-  Task& task = cleared(out, 6, robot.n_q());
+  const bool position = spec.rows != ReachRows::kOrientation;
+  const bool orientation = spec.rows != ReachRows::kPosition;
+  Task& task = cleared(out, position && orientation ? 6 : 3, robot.n_q());
   Jacobian6 J;
   robot.tool_jacobian(posture, J);
-  task.jacobian = J;
+  if (position) task.jacobian.topRows<3>() = J.topRows<3>();
+  if (orientation) task.jacobian.bottomRows<3>() = J.bottomRows<3>();
   // Equations (8) and (9).
   const Vector3 ahead_W = goal_WT.translation() - posture.T_WT.translation();
   const Vector3 turn_W = rotation_error(posture.T_WT.linear(), goal_WT.linear());
-  task.rate.head<3>() = saturated(spec.gain * ahead_W, spec.max_linear);
-  task.rate.tail<3>() = saturated(spec.gain * turn_W, spec.max_angular);
+  if (position) task.rate.head<3>() = saturated(spec.gain * ahead_W, spec.max_linear);
+  if (orientation) task.rate.tail<3>() = saturated(spec.gain * turn_W, spec.max_angular);
   task.activation.setOnes();
 }
 

@@ -38,7 +38,7 @@ class Scenario(Section):
 
     name: str = Field("unnamed", description="left out in a file: the file's own name")
     description: str = Field("", description="one line, shown in lists")
-    kind: Literal["static", "walkthrough"] = Field(description="what kind of scene this is")
+    kind: Literal["static", "walkthrough", "guided"] = Field(description="what kind of scene this is")
     robot: str = Field(description="a built-in robot's name, or a path to .urdf or .xml")
     package_dirs: tuple[str, ...] = Field(
         (), description="where package:// paths of the robot's file are looked up"
@@ -71,9 +71,9 @@ class Scenario(Section):
 
 def kinds() -> dict[str, type[Scenario]]:
     """The class of each `kind`."""
-    from proxcgal.sim.walk.keys import WalkScenario  # which is made from Scenario
+    from proxcgal.sim.walk.keys import GuidedScenario, WalkScenario  # made from Scenario
 
-    return {"static": Scenario, "walkthrough": WalkScenario}
+    return {"static": Scenario, "walkthrough": WalkScenario, "guided": GuidedScenario}
 
 
 def list_scenarios() -> dict[str, str]:

@@ -17,7 +17,15 @@ from proxcgal.sim.scenario_keys import (
 )
 
 SensedController = Literal["wb", "sm", "wb_memory"]
-TaskName = Literal["avoidance", "reach", "joint_limits", "minimum_altitude", "manipulability"]
+TaskName = Literal[
+    "avoidance",
+    "reach",
+    "reach_position",
+    "reach_orientation",
+    "joint_limits",
+    "minimum_altitude",
+    "manipulability",
+]
 
 
 class Filter(Section):

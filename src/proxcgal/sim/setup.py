@@ -162,10 +162,11 @@ def _task(name: str, settings: Controller) -> Any:
                 d_min=settings.d_min, buffer=settings.buffer, gain=settings.avoid_gain,
                 nearest=settings.nearest,
             )  # fmt: skip
-        case "reach":
+        case "reach" | "reach_position" | "reach_orientation":
             return _core.Reach(
                 gain=settings.reach_gain, max_linear=settings.max_linear,
                 max_angular=settings.max_angular,
+                rows=name.removeprefix("reach").removeprefix("_") or "both",
             )  # fmt: skip
         case "joint_limits":
             return _core.JointLimits(**_keys(settings.joint_limits))

@@ -24,6 +24,7 @@ from proxcgal.sim.source import SimulatedSource
 from proxcgal.sim.ticks import Tick, TickTruth
 from proxcgal.sim.trial_log import TOO_CLOSE, TrialLog, final_ticks
 from proxcgal.sim.truth import NOT_ASKED, Truth
+from proxcgal.sim.walk.guided import GuidedScenario, GuidedSource
 from proxcgal.sim.world import World
 
 __all__ = ["CONTROLLERS", "TrialLog", "first_difference", "recompute", "run_trial"]
@@ -69,7 +70,8 @@ def run_trial(
     law = setup.make_controller(controller, 0 if known is None else len(known))
     faults = FaultInjector(scenario.faults, [mount.name for mount in setup.skin.mounts], seed)
     world = World(setup.robot, setup.scene) if known is None else None
-    source = SimulatedSource(setup, world, seed)
+    make = GuidedSource if isinstance(scenario, GuidedScenario) else SimulatedSource
+    source = make(setup, world, seed)
     if world is not None and scenario.skin.check_mounts:
         require_mounts(setup, source)
     sparse = (sparse_truth or without_truth) and recorder is None

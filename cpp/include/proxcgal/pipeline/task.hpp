@@ -21,11 +21,15 @@ struct Avoidance {
   void validate() const;
 };
 
+/// What of the goal is reached for: all of it in one level, or one half.
+enum class ReachRows : std::uint8_t { kBoth, kPosition, kOrientation };
+
 /// Bring the tool to the goal: [WA] eqs. (8) to (10), both rates saturated.
 struct Reach {
   double gain = 1.0;         ///< [1/s] lambda
   double max_linear = 0.25;  ///< [m/s]
   double max_angular = 0.5;  ///< [rad/s]
+  ReachRows rows = ReachRows::kBoth;
   void validate() const;
 };
 
@@ -96,7 +100,7 @@ struct BuiltTask {
 /// @param pairs  the most important first; one row each, at most kMaxRows
 void build_avoidance(const Avoidance& spec, const Robot& robot, const Posture& posture,
                      std::span<const ControlPair> pairs, BuiltTask& out);
-/// Six rows: gain (x_goal - x_ee) and gain n theta, each shortened to its bound.
+/// Six rows, or three of them: gain (x_goal - x_ee) and gain n theta, each shortened to its bound.
 void build_reach(const Reach& spec, const Robot& robot, const Posture& posture, const Pose& goal_WT,
                  BuiltTask& out);
 /// J = I, towards the middle of the joint's range. A joint with one limit only is pulled back to

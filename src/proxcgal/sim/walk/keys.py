@@ -175,4 +175,18 @@ class WalkScenario(Scenario):
         return self.model_copy(update={"guard": guard, "legs": legs})
 
 
+class GuidedScenario(Scenario):
+    """An arm with sensors that a hand guides, while its body keeps away from what they see.
+
+    The twist that the hand asks for enters the stack as the reach levels' goal, ahead of the tool by
+    that twist over `controller.reach_gain`: their rate, gain times what is left, is then that twist.
+    """
+
+    kind: Literal["guided"]
+    goal: Goal = Field(default_factory=lambda: Goal(offset=(0.0, 0.0, 0.0)))
+    legs: tuple[Leg, ...] = Field(alias="leg", min_length=1, description="the wished path")
+    hand: Hand = Field(default_factory=Hand)
+    admittance: Admittance = Field(default_factory=Admittance)
+
+
 _SLOW_SHARE = 0.9  # of the bound that an operator dares: as 1.17 m/s of 1.30
