@@ -70,6 +70,8 @@ def perform(
         ProxError: a trial failed; recordings up to then are kept.
         KeyboardInterrupt: with a message of what was kept.
     """
+    from proxcgal.sim.walk.guided import GuidedScenario, off_paths
+
     trials = [(plan, name) for plan in plans for name in plan.controllers]
     made = ready([plan.folder for plan in plans])
     try:
@@ -82,6 +84,8 @@ def perform(
             summaries = []
             for plan, own in zip(plans, grouped, strict=True):
                 summaries.append(static_summary(own))
+                if isinstance(plan.scenario, GuidedScenario):
+                    summaries[-1]["tool_off_path_m"] = off_paths(plan.scenario, own)
                 write_text(plan.folder / "scenario.toml", plan.scenario.to_toml())
                 write_json(plan.folder / "run.json", _about(plan, own, origin))
                 write_json(plan.folder / "summary.json", summaries[-1])

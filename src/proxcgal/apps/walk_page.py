@@ -7,7 +7,7 @@ from html import escape
 
 from proxcgal.apps.document import PICTURE_BYTES, document, origin_part, picture
 from proxcgal.apps.stored import StoredWalk
-from proxcgal.apps.walkthrough import FIGURE, RECORDING, TABLE, TRAJECTORY, lines_of
+from proxcgal.apps.walkthrough import FIGURE, RATINGS, RECORDING, TABLE, TRAJECTORY, lines_of
 from proxcgal.errors import ConfigError
 
 _TAUGHT = (
@@ -20,6 +20,10 @@ _TRIPPED = (
     "The quantity that tripped, its limit, and the Safe Torque Off signal, scaled, in the form of "
     "the paper's Figs. 6 to 8; right, magnified. Red: the trip. Green: all joints at rest. Between "
     "the two the brakes have yet to close: weight and hand still move the arm."
+)
+_RATED = (
+    "Testers' ratings, from the user's own table, in the form of the paper's Fig. 9: box plot with "
+    "median (orange) and mean (green), and the share of testers that gave each rating."
 )
 #: Form and numbers that the paper prints for the same.
 _PAPER = {
@@ -58,6 +62,7 @@ def _parts(stored: StoredWalk) -> Iterator[str]:
             yield f"<p>The paper [WT], {escape(paper)}</p>"
     caption = _TRIPPED if summary["trips"] else _TAUGHT
     yield picture(stored.folder / FIGURE, caption, PICTURE_BYTES)[0]
+    yield picture(stored.folder / RATINGS, _RATED, PICTURE_BYTES // 4)[0]
     pairs = ", ".join(map(str, summary["monitored_pairs"]))
     yield f"<p>Distance to the operator is monitored of: {escape(pairs)}.</p>"
     for entry in summary["accepted"]:

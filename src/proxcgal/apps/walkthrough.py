@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from proxcgal.apps.progress import Progress, announce
-from proxcgal.study.analysis import aligned
+from proxcgal.study.analysis import aligned, write_bytes
 
 if TYPE_CHECKING:
     from proxcgal.sim.walk.keys import WalkScenario
@@ -15,6 +14,7 @@ if TYPE_CHECKING:
     from proxcgal.sim.walk.setup import WalkSetup
 
 RECORDING, FIGURE, TABLE, TRAJECTORY = "taught.mcap", "walkthrough.png", "path.csv", "path.json"
+RATINGS = "ratings.png"
 
 
 def run_walkthrough(
@@ -31,13 +31,17 @@ def run_walkthrough(
     from proxcgal.apps.results import ready, remove_empty
     from proxcgal.sim.walk.run import run_walk
     from proxcgal.sim.walk.setup import WalkSetup
+    from proxcgal.study.figures import png
+    from proxcgal.study.ratings import read_ratings
+    from proxcgal.study.walk_figures import ratings_figure
 
+    ratings = read_ratings(Path(scenario.ratings)) if scenario.ratings else {}
     announce(f"setting up {scenario.name}", quiet=quiet)
     setup = WalkSetup.of(scenario)
     told = setup.told()
     print("\n".join(told))
     made = ready([folder])
-    for name in (RECORDING, FIGURE, TABLE, TRAJECTORY):
+    for name in (RECORDING, FIGURE, TABLE, TRAJECTORY, RATINGS):
         (folder / name).unlink(missing_ok=True)
     try:
         with Progress("teaching", [1.0], "", quiet=quiet) as progress:
@@ -45,6 +49,8 @@ def run_walkthrough(
                 setup, seed=scenario.seed, recording=folder / RECORDING,
                 on_progress=lambda share: progress.shares([share]),
             )  # fmt: skip
+        if ratings:
+            write_bytes(folder / RATINGS, png(ratings_figure(ratings)))
         summary = _write(setup, result, folder, origin | {"guard": told})
     finally:
         remove_empty(made)
@@ -57,7 +63,7 @@ def _write(
     setup: WalkSetup, result: WalkResult, folder: Path, origin: dict[str, Any]
 ) -> dict[str, Any]:
     from proxcgal.sim.walk.taught import to_csv, to_trajectory
-    from proxcgal.study.analysis import write_bytes, write_json, write_text
+    from proxcgal.study.analysis import write_json, write_text
     from proxcgal.study.figures import png
     from proxcgal.study.walk_figures import teach_figure, trip_figure
 
@@ -82,8 +88,6 @@ def _write(
     write_text(folder / "scenario.toml", scenario.to_toml())
     write_json(folder / "run.json", {**origin, "description": scenario.description})
     write_json(folder / "summary.json", summary)
-    if (folder / RECORDING).stat().st_size == 0:
-        warnings.warn(f"{folder / RECORDING} is empty", RuntimeWarning, stacklevel=2)
     return summary
 
 

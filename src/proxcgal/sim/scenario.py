@@ -143,6 +143,9 @@ def _anchor(table: dict[str, Any], folder: Path) -> None:
     robot = table.get("robot")
     if isinstance(robot, str) and is_robot_file(robot):
         table["robot"] = str((folder / robot).absolute())
+    ratings = table.get("ratings")
+    if isinstance(ratings, str):
+        table["ratings"] = str((folder / ratings).absolute())
     places = table.get("package_dirs")
     if isinstance(places, list) and all(isinstance(place, str) for place in places):
         table["package_dirs"] = [str((folder / place).absolute()) for place in places]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, cast
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from proxcgal import _core
 from proxcgal.sim.source import SimulatedSource
 from proxcgal.sim.ticks import TickInput
-from proxcgal.sim.walk.hand import Hand, rotation
+from proxcgal.sim.walk.hand import Hand, rotation_of
 from proxcgal.sim.walk.keys import GuidedScenario
 from proxcgal.sim.walk.wish import Wish
 
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-__all__ = ["GuidedScenario", "GuidedSource", "off_path"]
+__all__ = ["GuidedScenario", "GuidedSource", "off_path", "off_paths"]
 
 
 class GuidedSource(SimulatedSource):
@@ -57,7 +58,7 @@ class GuidedSource(SimulatedSource):
         self._cycle += 1
         goal = T.copy()
         goal[:3, 3] += wanted[:3] / self._gain
-        goal[:3, :3] = rotation(wanted[3:] / self._gain) @ T[:3, :3]
+        goal[:3, :3] = rotation_of(wanted[3:] / self._gain) @ T[:3, :3]
         return replace(given, goal=goal)
 
     def command(self, qd: Array) -> None:
@@ -73,3 +74,12 @@ def off_path(scenario: GuidedScenario, log: TrialLog) -> Array:
     path = log.tool_W[0] + wish.position
     found: Array = np.array([np.linalg.norm(path - tool, axis=1).min() for tool in log.tool_W])
     return found
+
+
+def off_paths(scenario: GuidedScenario, logs: Sequence[TrialLog]) -> dict[str, dict[str, float]]:
+    """The most and the root mean square of it, by controller [m]."""
+    found = {log.controller: off_path(scenario, log) for log in logs}
+    return {
+        name: {"max": float(apart.max()), "rms": float(np.sqrt((apart**2).mean()))}
+        for name, apart in found.items()
+    }

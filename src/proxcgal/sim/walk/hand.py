@@ -51,7 +51,7 @@ class Hand:
         force[:3] = keys.stiffness * (self._start[:3, 3] + wish.position[row] - position)
         force[:3] += keys.damping * (wish.velocity[row] - twist[:3])
         force[:3] += self._tremor[min(cycle, len(self._tremor) - 1)]
-        wanted = rotation(wish.turn[row]) @ self._start[:3, :3]
+        wanted = rotation_of(wish.turn[row]) @ self._start[:3, :3]
         force[3:] = keys.turn_stiffness * _turn_between(rotation, wanted)
         force[3:] += keys.turn_damping * (wish.spin[row] - twist[3:])
         _bound(force[:3], keys.max_force)
@@ -83,7 +83,7 @@ def _turn_between(here: Array, there: Array) -> Array:
     return 0.5 * axis
 
 
-def rotation(vector: Array) -> Array:
+def rotation_of(vector: Array) -> Array:
     """(3, 3) of a rotation vector [rad]."""
     x, y, z = (float(v) for v in vector)
     angle = math.sqrt(x * x + y * y + z * z)

@@ -145,6 +145,10 @@ class WalkScenario(Scenario):
         None, min_length=2, max_length=2, description="[s] of the figure's window; none: the stop's"
     )
 
+    ratings: str | None = Field(
+        None, description="CSV of testers' ratings, 0 to 10, a column an indicator: drawn as Fig. 9"
+    )
+
     @model_validator(mode="before")
     @classmethod
     def _nothing_else(cls, table: Any) -> Any:
