@@ -164,7 +164,9 @@ def test_a_capsules_mesh_is_closed_and_lies_on_it(length: float) -> None:
     ideal = np.pi * 0.15**2 * (length + 4 / 3 * 0.15)
     assert mesh.volume == pytest.approx(ideal, rel=0.03)
     along = np.clip(vertices[:, 1], 0.0, length)
-    apart = np.linalg.norm(vertices - np.stack([0 * along + 0.1, along, 0 * along + 0.2], 1), axis=1)
+    apart = np.linalg.norm(
+        vertices - np.stack([0 * along + 0.1, along, 0 * along + 0.2], 1), axis=1
+    )
     np.testing.assert_allclose(apart, 0.15, atol=1e-12)
 
 

@@ -10,15 +10,21 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from pydantic import BaseModel
 
 from proxcgal.errors import ConfigError, RecordingError
 from proxcgal.models.builtin import ga_ol
+from proxcgal.sim import toml
 from proxcgal.sim.physics import Physics
 from proxcgal.sim.scenario import load_scenario, parse_scenario
-from proxcgal.sim.walk.keys import Leg, WalkScenario
+from proxcgal.sim.scenario_problems import models_in
+from proxcgal.sim.trial import run_trial
+from proxcgal.sim.walk.guided import off_path
+from proxcgal.sim.walk.keys import GuidedScenario, Leg, WalkScenario
 from proxcgal.sim.walk.log import WalkLog
 from proxcgal.sim.walk.playback import check_start, play
 from proxcgal.sim.walk.poses import read_poses
@@ -27,7 +33,13 @@ from proxcgal.sim.walk.stops import STRETCHED, worst_stops
 from proxcgal.sim.walk.taught import TaughtPath, clean, to_csv, to_trajectory, tool_positions
 from proxcgal.sim.walk.teach import teach
 from proxcgal.sim.walk.wish import Wish
+from proxcgal.study.ratings import read_ratings
 
+ROOT = Path(__file__).parents[1]
+DOCS, SCENARIOS = ROOT / "docs" / "walkthrough.md", ROOT / "docs" / "scenarios.md"
+#: Tables of other kinds of scene.
+OTHERS = ("| `goal.", "| `skin.", "| `limits.", "| `controller.", "| `simulation.", "| `obstacle.",
+          "| `fault.", "| `perception`")  # fmt: skip
 OWN = {
     "walkthrough_overspeed": "tcp_speed",
     "walkthrough_too_close": "distance",
@@ -277,7 +289,60 @@ def test_bad_input_is_told_in_one_line(change: str, told: str) -> None:
         setup_of("walkthrough_teach", change)
 
 
-def test_a_run_writes_what_the_experiment_asks_for(call: Callable[..., object]) -> None:
+def test_every_key_is_documented_with_its_default() -> None:
+    text = DOCS.read_text()
+    missing = [row for row in rows_of(WalkScenario) if row not in text and "`kind`" not in row]
+    static = SCENARIOS.read_text()
+    assert [row for row in missing if row not in static and not row.startswith(OTHERS)] == []
+
+
+def rows_of(model: type[BaseModel], path: str = "") -> list[str]:
+    """The rows of the documentation's tables: key, default, meaning."""
+    rows = []
+    for name, field in model.model_fields.items():
+        key = f"{path}{field.alias or name}"
+        if inner := list(models_in(field.annotation)):
+            rows += rows_of(inner[0], f"{key}.")
+        else:
+            value = field.get_default(call_default_factory=True, validated_data={})
+            default = "required" if field.is_required() else toml.format_value(value)
+            rows.append(f"| `{key}` | {default} | {field.description} |".replace("None", "-"))
+    return rows
+
+
+def test_ratings_of_a_users_own_are_read_and_what_is_wrong_is_told(tmp_path: Path) -> None:
+    table = tmp_path / "ratings.csv"
+    table.write_text("safety,stress\n9,1\n8,\n10,2.5\n")
+    assert read_ratings(table) == {"safety": [9.0, 8.0, 10.0], "stress": [1.0, 2.5]}
+    table.write_text("safety,stress\n11,x\n")
+    with pytest.raises(ConfigError) as caught:
+        read_ratings(table)
+    assert len(str(caught.value).splitlines()) == 2
+    assert "line 2, safety = '11': a number from 0 to 10" in str(caught.value)
+
+
+def test_the_arm_keeps_away_from_a_bystander_while_the_tool_follows_the_hand() -> None:
+    short = ("duration=5.0", "perception=known")
+    guided = load_scenario("walkthrough_bystander", short)
+    assert isinstance(guided, GuidedScenario)
+    alone = ('controller.tasks=["reach_position", "reach_orientation"]',)
+    logs = [
+        run_trial(scenario, "wb_known", sparse_truth=True)
+        for scenario in (guided, load_scenario("walkthrough_bystander", (*short, *alone)))
+    ]
+    kept, heedless = (log.summary()["true_min_m"] for log in logs)
+    assert kept > heedless + 0.03
+    assert kept >= guided.controller.d_min
+    assert off_path(guided, logs[0]).max() < 0.05
+
+
+def test_an_operator_who_rides_on_the_tool_has_the_tools_velocity() -> None:
+    name, change = "walkthrough_closing_fast", "guard.subtract_human=true"
+    log = teach(setup_of(name, change), seed=0)
+    assert "relative_velocity" not in [trip.function for trip in log.trips]
+
+
+def test_a_run_writes_what_the_experiment_asks_for(call: Callable[..., Any]) -> None:
     answer = call("run", "walkthrough_overspeed", "--quiet")
     assert answer.code == 0, answer.err
     folder = Path("out/walkthrough_overspeed")
@@ -293,7 +358,7 @@ def test_a_run_writes_what_the_experiment_asks_for(call: Callable[..., object]) 
 
 
 def test_a_campaign_draws_the_same_operators_again_and_finds_no_false_trip(
-    call: Callable[..., object],
+    call: Callable[..., Any],
 ) -> None:
     answer = call("campaign", "walkthrough", "--runs", "4", "--workers", "1", "--quiet")
     assert answer.code == 0, answer.err

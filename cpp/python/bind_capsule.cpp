@@ -1,3 +1,5 @@
+#include <nanobind/stl/pair.h>
+
 #include <utility>
 
 #include "convert.hpp"

@@ -118,8 +118,7 @@ void bind_guard(nanobind::module_& m) {
           "max_velocity"_a = SeparationConfig{}.max_velocity,
           "pairs"_a = std::vector<std::string>{}, "ends"_a = std::vector<std::string>{},
           "human_radius"_a = OperatorCapsule{}.radius, "human_height"_a = OperatorCapsule{}.height,
-          "human_offset"_a = Eigen::Vector3d(OperatorCapsule{}.offset_T),
-          "subtract_human"_a = false, "iso"_a = IsoSeparation{},
+          "human_offset"_a = nb::none(), "subtract_human"_a = false, "iso"_a = IsoSeparation{},
           "accept"_a = std::vector<std::string>{})
       .def_ro("tcp_speed", &GuardConfig::tcp_speed, "[m/s] xd_UB")
       .def_ro("accept", &GuardConfig::accept, "Contradictions taken as they are, item by item.")

@@ -26,16 +26,23 @@ void bind_guiding(nanobind::module_& m) {
           "__init__",
           [](AdmittanceConfig* self, nb::handle mass, nb::handle damping, nb::handle dead_band,
              nb::handle max_force, double engage_time) {
-            const AdmittanceConfig config{vector6_from(mass, "mass"),
-                                          vector6_from(damping, "damping"),
-                                          vector6_from(dead_band, "dead_band"),
-                                          vector6_from(max_force, "max_force"), engage_time};
+            AdmittanceConfig config;
+            const auto take = [](nb::handle value, const char* name, Vector6& field) {
+              if (!value.is_none()) field = vector6_from(value, name);
+            };
+            take(mass, "mass", config.mass);
+            take(damping, "damping", config.damping);
+            take(dead_band, "dead_band", config.dead_band);
+            take(max_force, "max_force", config.max_force);
+            config.engage_time = engage_time;
             config.validate();
             new (self) AdmittanceConfig(config);
           },
-          nb::kw_only(), "mass"_a = fresh.mass, "damping"_a = fresh.damping,
-          "dead_band"_a = fresh.dead_band, "max_force"_a = fresh.max_force,
-          "engage_time"_a = fresh.engage_time, "Raises: ConfigError with field, value and bound.")
+          nb::kw_only(), "mass"_a = nb::none(), "damping"_a = nb::none(),
+          "dead_band"_a = nb::none(), "max_force"_a = nb::none(),
+          "engage_time"_a = fresh.engage_time,
+          "Args: six numbers each, None for the defaults.\nRaises: ConfigError with field, value "
+          "and bound.")
       .def_prop_ro(
           "mass", [](const AdmittanceConfig& c) { return Vector6(c.mass); }, "(6,) [kg], [kg m^2]")
       .def_prop_ro(
@@ -61,9 +68,7 @@ void bind_guiding(nanobind::module_& m) {
           "Args: force (6,) at the handle [N], [N m]; engaged, the hand's switch; dt [s].")
       .def(
           "held_to",
-          [](Admittance& a, nb::handle achieved) {
-            a.held_to(vector6_from(achieved, "achieved"));
-          },
+          [](Admittance& a, nb::handle achieved) { a.held_to(vector6_from(achieved, "achieved")); },
           "achieved"_a,
           "What became of the last step's velocity (6,): axes that were held back lose the energy.")
       .def_prop_ro(

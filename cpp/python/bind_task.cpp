@@ -44,7 +44,8 @@ void bind_task(nanobind::module_& m) {
           "__init__",
           [](Reach* self, double gain, double max_linear, double max_angular,
              const std::string& rows) {
-            construct(self, {gain, max_linear, max_angular, choice(rows, "Reach.rows", kReachRows)});
+            construct(self,
+                      {gain, max_linear, max_angular, choice(rows, "Reach.rows", kReachRows)});
           },
           nb::kw_only(), "gain"_a = Reach{}.gain, "max_linear"_a = Reach{}.max_linear,
           "max_angular"_a = Reach{}.max_angular, "rows"_a = "both", raises)

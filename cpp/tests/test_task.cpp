@@ -196,6 +196,27 @@ TEST(Reach, PullsStraightToTheGoalWithinItsBounds) {
   EXPECT_EQ(Eigen::MatrixXd(built.task.jacobian), Eigen::MatrixXd(J));
 }
 
+TEST(Reach, ForHalfOfTheGoalIsHalfOfItsRows) {
+  const Robot robot = arm(6);
+  Random random(41);
+  const Posture posture = at(robot, random_q(random, 6));
+  Pose goal = posture.T_WT;
+  goal.translation() += Vector3(0.1, -0.2, 0.3);
+  goal.linear() = goal.linear() * Eigen::AngleAxisd(0.4, Vector3::UnitX()).toRotationMatrix();
+  BuiltTask whole, half;
+  build_reach({}, robot, posture, goal, whole);
+  for (const auto& [rows, first] :
+       {std::pair{ReachRows::kPosition, 0}, {ReachRows::kOrientation, 3}}) {
+    Reach spec;
+    spec.rows = rows;
+    build_reach(spec, robot, posture, goal, half);
+    EXPECT_EQ(Eigen::MatrixXd(half.task.jacobian),
+              Eigen::MatrixXd(whole.task.jacobian.middleRows(first, 3)));
+    EXPECT_EQ(half.task.rate, whole.task.rate.segment(first, 3));
+    EXPECT_EQ(half.task.activation.size(), 3);
+  }
+}
+
 TEST(RotationError, TurnsOneFrameIntoTheOtherUpToAHalfTurn) {
   Random random(6);
   const double pi = std::numbers::pi;

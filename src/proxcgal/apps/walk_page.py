@@ -52,7 +52,8 @@ def walk_page(stored: StoredWalk) -> str:
 def _parts(stored: StoredWalk) -> Iterator[str]:
     summary = stored.summary
     if stored.about.description:
-        yield f"<p>{escape(stored.about.description[:1].upper() + stored.about.description[1:])}.</p>"
+        text = stored.about.description
+        yield f"<p>{escape(text[:1].upper() + text[1:])}.</p>"
     for line in lines_of(summary):
         tag = "pre" if "\n" in line else "p"
         yield f"<{tag}>{escape(line)}</{tag}>"

@@ -74,14 +74,15 @@ def fit_capsule(vertices: Floats) -> Capsule:
     points = np.asarray(vertices, np.float64)
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
-    axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2] if size else np.eye(3)
-    best = min(
-        (_improved(points, middle, axis, size) for axis in axes), key=lambda found: found[0]
+    axes = (
+        np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2] if size else np.eye(3)
     )
+    best = min((_improved(points, middle, axis, size) for axis in axes), key=lambda found: found[0])
     _, start, end, _ = best
     # The radius once more, from the ends as they are: nothing may be outside by a rounding.
-    share = np.clip((points - start) @ (end - start) / max((end - start) @ (end - start), _TINY), 0, 1)
-    apart = np.linalg.norm(points - start - share[:, None] * (end - start), axis=1)
+    along = end - start
+    share = np.clip((points - start) @ along / max(float(along @ along), _TINY), 0.0, 1.0)
+    apart = np.linalg.norm(points - start - share[:, None] * along, axis=1)
     return Capsule(start, end, float(apart.max()) + _ROUNDING)
 
 

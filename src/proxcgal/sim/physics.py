@@ -119,13 +119,13 @@ class Physics:
         return float(self._data.time)
 
     @property
-    def tool_W(self) -> Array:
+    def tool_W(self) -> Array:  # noqa: N802  a frame's suffix
         """(3,) origin of the tool [m]; a view."""
         position: Array = self._data.site_xpos[self._tool]
         return position
 
     @property
-    def tool_R(self) -> Array:
+    def tool_R(self) -> Array:  # noqa: N802  a rotation
         """(3, 3) R_WT; a view."""
         rotation: Array = self._data.site_xmat[self._tool].reshape(3, 3)
         return rotation
@@ -143,6 +143,11 @@ class Physics:
             self._model, self._data, mujoco.mjtObj.mjOBJ_SITE, self._tool, twist, 0
         )
         return np.concatenate([twist[3:], twist[:3]])
+
+    def human_velocity(self) -> Array:
+        """(3,) of the middle of the operator's capsule, which rides on the tool [m/s]."""
+        twist = self.tool_twist()
+        return twist[:3] + np.cross(twist[3:], self.tool_R @ self._human_offset)
 
     def truth(self, pairs: tuple[str, ...], ends: Sequence[tuple[str, Array]]) -> Truth:
         """What the guard should find, by MuJoCo's own kinematics and distances: an oracle.

@@ -38,7 +38,9 @@ class Scenario(Section):
 
     name: str = Field("unnamed", description="left out in a file: the file's own name")
     description: str = Field("", description="one line, shown in lists")
-    kind: Literal["static", "walkthrough", "guided"] = Field(description="what kind of scene this is")
+    kind: Literal["static", "walkthrough", "guided"] = Field(
+        description="what kind of scene this is"
+    )
     robot: str = Field(description="a built-in robot's name, or a path to .urdf or .xml")
     package_dirs: tuple[str, ...] = Field(
         (), description="where package:// paths of the robot's file are looked up"

@@ -19,7 +19,7 @@ from proxcgal.study.analysis import Summary
 from proxcgal.study.campaign import Campaign, Trial
 from proxcgal.study.figures import DASHED, DPI, GREY
 from proxcgal.study.kind import Kind, Listing, Wishes
-from proxcgal.study.trials import identity, robot_of
+from proxcgal.study.trials import robot_of
 from proxcgal.study.walk_draws import OWN, WISHES, draw_walk
 
 if TYPE_CHECKING:
@@ -106,8 +106,7 @@ def analyse(table: pl.DataFrame, campaign: Campaign) -> Summary:
     """The numbers of `summary.json`: by what operators did, and over all stops."""
     done = table.filter(pl.col("error").is_null())
     wishes = {
-        str(name): _of(part)
-        for (name,), part in done.group_by(["wish"], maintain_order=True)
+        str(name): _of(part) for (name,), part in done.group_by(["wish"], maintain_order=True)
     }
     stopped = done.filter(pl.col("tripped") != "none")
     return {
@@ -170,9 +169,9 @@ def listings(summary: Summary) -> list[Listing]:
         )  # fmt: skip
     return [
         Listing(
-            caption="A trip is false where nothing was truly violated in its cycle, and missed where "
-            "something was and nothing tripped; latency from the first truly violated cycle. True is "
-            "what the simulator's own kinematics, distances and accelerations say.",
+            caption="A trip is false where nothing was truly violated in its cycle, and missed "
+            "where something was and nothing tripped; latency from the first truly violated cycle. "
+            "True is what the simulator's own kinematics, distances and accelerations say.",
             names=("operator", "to trip", "runs", "as meant", "false", "missed", "latency",
                    "stop, median", "worst", "way, median", "worst", "tool speed", "playback rms"),
             units=("", "", "", "runs", "trips", "", "cycles", "s", "s", "m", "m", "m/s", "mm"),
@@ -188,9 +187,7 @@ def _number(value: Any, form: str = "{:.3f}", factor: float = 1.0) -> str:
 def verdicts(summary: Summary) -> list[str]:
     """Trips, stops and false trips, in words."""
     stop, way = summary["stop_time_s"], summary["stop_distance_m"]
-    told = [
-        f"{summary['false_trips']} false trips, {summary['missed']} violations without a trip."
-    ]
+    told = [f"{summary['false_trips']} false trips, {summary['missed']} violations without a trip."]
     if stop is not None and way is not None:
         within = "all" if stop["max"] <= summary["stop_time_bound_s"] else "not all"
         told.append(
@@ -215,7 +212,10 @@ def figures(table: pl.DataFrame) -> dict[str, Figure]:
     FigureCanvasAgg(figure)
     for ax, (column, label, bound) in zip(
         figure.subplots(1, 2, sharey=True),
-        (("stop_time_s", "stopping time [s]", 0.35), ("stop_distance_m", "way of the tool [m]", 0.455)),
+        (
+            ("stop_time_s", "stopping time [s]", 0.35),
+            ("stop_distance_m", "way of the tool [m]", 0.455),
+        ),
         strict=True,
     ):  # fmt: skip
         for name, colour in COLOURS.items():
@@ -224,8 +224,15 @@ def figures(table: pl.DataFrame) -> dict[str, Figure]:
                 share = np.arange(1, len(values) + 1) / len(values)
                 ax.step(values, share, where="post", color=colour, lw=1.6, label=name)
         ax.axvline(bound, color=GREY, lw=1.0, ls=DASHED)
-        ax.annotate("declared" if column == "stop_time_s" else "min_distance", (bound, 0.04),
-                    xytext=(-4, 0), textcoords="offset points", ha="right", fontsize=9, color=GREY)
+        ax.annotate(
+            "declared" if column == "stop_time_s" else "min_distance",
+            (bound, 0.04),
+            xytext=(-4, 0),
+            textcoords="offset points",
+            ha="right",
+            fontsize=9,
+            color=GREY,
+        )
         ax.set_xlim(0.0, 1.15 * bound)
         ax.set_xlabel(label, fontsize=10)
         ax.tick_params(labelsize=9)
@@ -239,9 +246,9 @@ def figures(table: pl.DataFrame) -> dict[str, Figure]:
 def captions(summary: Summary) -> dict[str, str]:
     """What the figure shows."""
     return {
-        "stops.png": "Stopping times and ways of the tool, from the trip to rest, as simulated with "
-        "weight and brakes: the share of stops up to each value, by what the operator did. Dashed: "
-        "the declared stopping time, and the minimum distance of 0.455 m."
+        "stops.png": "Stopping times and ways of the tool, from the trip to rest, as simulated "
+        "with weight and brakes: the share of stops up to each value, by what the operator did. "
+        "Dashed: the declared stopping time, and the minimum distance of 0.455 m."
     }
 
 
@@ -253,8 +260,8 @@ def worst(table: pl.DataFrame) -> list[str]:
 KIND = Kind(
     title="Walk-through programming",
     introduction="Simulated operators with random hands, bodies and paths guide a painting arm. A "
-    "quarter of them keep within the bounds, the others pull too fast, come too near, or let the arm "
-    "close in too fast. Engineering figures from a simulation, not a certificate.",
+    "quarter of them keep within the bounds, the others pull too fast, come too near, or let the "
+    "arm close in too fast. Engineering figures from a simulation, not a certificate.",
     plan=plan, analyse=analyse, listings=listings, verdicts=verdicts, figures=figures,
     captions=captions, worst=worst,
 )  # fmt: skip

@@ -14,6 +14,7 @@ from proxcgal.sim.scenario import load_scenario
 from proxcgal.sim.walk.keys import WalkScenario
 from proxcgal.sim.walk.setup import WalkSetup
 from proxcgal.sim.walk.wish import Wish
+from proxcgal.study.trials import robot_of
 
 Array = NDArray[np.float64]
 
@@ -105,8 +106,8 @@ def _compliant(g: np.random.Generator) -> list[str]:
         side = -side
         to = (g.uniform(-0.10, 0.10), side * g.uniform(0.4, 0.75), g.uniform(-0.2, 0.2))
         legs.append(
-            _leg(to, g.uniform(-0.15, 0.15, 3), speed=g.uniform(0.5, 1.10), ramp=g.uniform(0.8, 1.1),
-                 wait=g.uniform(0.0, 0.4))
+            _leg(to, g.uniform(-0.15, 0.15, 3).tolist(), speed=g.uniform(0.5, 1.10),
+                 ramp=g.uniform(0.8, 1.1), wait=g.uniform(0.0, 0.4))
         )  # fmt: skip
     return legs
 
@@ -148,7 +149,7 @@ _LEGS = {
 
 def _beyond(scenario: WalkScenario) -> str | None:
     """Why a wish is not compliant; None where it is. The arm is thought to follow it exactly."""
-    setup = WalkSetup.of(scenario, _robot(scenario))
+    setup = WalkSetup.of(scenario, robot_of(scenario))
     robot, keys = setup.robot, scenario.guard
     wish = Wish.of(scenario.legs, _STEP)
     bounds = setup.bounds
@@ -172,9 +173,3 @@ def _beyond(scenario: WalkScenario) -> str | None:
             return "relative velocity"
         q = q + _STEP * qd
     return None
-
-
-def _robot(scenario: WalkScenario):  # type: ignore[no-untyped-def]
-    from proxcgal.study.trials import robot_of
-
-    return robot_of(scenario)

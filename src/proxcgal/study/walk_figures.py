@@ -90,7 +90,7 @@ def _stop_arrow(ax: Axes, log: WalkLog) -> None:
 
 
 def teach_figure(result: WalkResult, *, title: str, hand_guiding: float) -> Figure:
-    """Speed while teaching, at full speed and by the hand-guiding rules; the path taught and played.
+    """Speed while teaching, fast and by the hand-guiding rules; the path taught and played back.
 
     Args:
         result: one that was taught to the end.
@@ -111,7 +111,9 @@ def teach_figure(result: WalkResult, *, title: str, hand_guiding: float) -> Figu
                label="STO, scaled")  # fmt: skip
     if result.slow is not None:
         slow = result.slow
-        speed.plot(slow.time, slow.tcp_speed, color=GREEN, lw=1.2, label="by the hand-guiding rules")
+        speed.plot(
+            slow.time, slow.tcp_speed, color=GREEN, lw=1.2, label="by the hand-guiding rules"
+        )
         speed.axhline(hand_guiding, color=GREEN, lw=0.9, ls=(0, (1, 1.5)))
     speed.plot(log.time, log.tcp_speed, color=BLUE, lw=1.4, label="at the process's speed")
     speed.axhline(log.tcp_limit, color=GREY, lw=1.0, ls=(0, (1, 1.5)), label="limits")

@@ -1,4 +1,4 @@
-"""The operator's hand on the handle: spring and damper, bounded, trembling, with a reaction time."""
+"""The operator's hand on the handle: spring and damper, bounded, trembling, slow to react."""
 
 from __future__ import annotations
 

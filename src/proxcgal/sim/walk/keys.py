@@ -57,7 +57,9 @@ class Guard(Section):
     max_velocity: Positive = Field(1.30, description="[m/s] maxVelTh")
     q_reference: tuple[float, ...] = Field(min_length=1, description="[rad] posture of eq. (1)")
     pairs: tuple[str, ...] = Field((), description="links whose distance counts; none: all")
-    ends: tuple[str, ...] = Field((), description="links whose far end's velocity counts; none: all")
+    ends: tuple[str, ...] = Field(
+        (), description="links whose far end's velocity counts; none: all"
+    )
     subtract_human: bool = Field(False, description="velocity relative to the tool's operator")
     accept: tuple[str, ...] = Field((), description="contradictions to take as they are, by item")
     human: Human = Field(default_factory=Human)
@@ -112,7 +114,9 @@ class Playback(Section):
     scale: Positive = Field(1.0, description="of the recorded timing: 2 takes twice as long")
     margin: Share = Field(0.95, description="of the guard's bounds that timing may use")
     start_tolerance: Positive = Field(0.005, description="[m] of the tool from the path's start")
-    approach_speed: Positive = Field(0.25, description="[m/s] of the tool on its way there, at most")
+    approach_speed: Positive = Field(
+        0.25, description="[m/s] of the tool on its way there, at most"
+    )
 
 
 class Arm(Section):
@@ -182,8 +186,8 @@ class WalkScenario(Scenario):
 class GuidedScenario(Scenario):
     """An arm with sensors that a hand guides, while its body keeps away from what they see.
 
-    The twist that the hand asks for enters the stack as the reach levels' goal, ahead of the tool by
-    that twist over `controller.reach_gain`: their rate, gain times what is left, is then that twist.
+    The twist that the hand asks for enters the stack as the reach levels' goal, ahead of the tool
+    by that twist over `controller.reach_gain`: their rate, gain times what is left, is that twist.
     """
 
     kind: Literal["guided"]

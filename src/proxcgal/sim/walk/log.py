@@ -59,12 +59,12 @@ class WalkLog:
     @classmethod
     def empty(cls, cycles: int, joints: int, period: float, keys: Guard) -> WalkLog:
         """Room for so many cycles under a guard with these keys."""
-        columns = {name: np.full(cycles, np.nan) for name in _COLUMNS}
+        columns: dict[str, Any] = {name: np.full(cycles, np.nan) for name in _COLUMNS}
         return cls(
             period=period, rest_speed=keys.rest_speed, tcp_limit=keys.tcp_speed,
-            distance_limit=keys.min_distance, velocity_limit=keys.max_velocity, q=np.zeros((cycles, joints)),
-            qd=np.zeros((cycles, joints)), tool_W=np.zeros((cycles, 3)),
-            torque=np.zeros(cycles, np.bool_), **columns,
+            distance_limit=keys.min_distance, velocity_limit=keys.max_velocity,
+            q=np.zeros((cycles, joints)), qd=np.zeros((cycles, joints)),
+            tool_W=np.zeros((cycles, 3)), torque=np.zeros(cycles, np.bool_), **columns,
         )  # fmt: skip
 
     def add(

@@ -51,18 +51,17 @@ def play(setup: WalkSetup, path: TaughtPath, q: Array | None = None) -> Played:
     run = round((scale * path.duration + _SETTLE) / PERIOD)
     begin = round(_BEGIN / PERIOD)
     start = begin + len(approach) + round(_SETTLE / PERIOD)
-    path_time = np.arange(run) * PERIOD / scale
+    path_time: Array = np.arange(run, dtype=np.float64) * PERIOD / scale
     wanted, speeds = path.at(path_time)
     speeds /= scale
     guard, physics = setup.make_guard(), setup.make_physics(q)
-    log = WalkLog.empty(
-        start + run, setup.robot.n_q, PERIOD, setup.scenario.guard
-    )
+    log = WalkLog.empty(start + run, setup.robot.n_q, PERIOD, setup.scenario.guard)
     bounds = (np.array(guard.qd_bounds), np.array(guard.qdd_bounds))
     still, sent = np.zeros_like(q), q.copy()
     for k in range(start + run):
         time = k * PERIOD
-        out = guard.cycle(time, physics.q, physics.qd, time >= _RESET_AT)
+        human = physics.human_velocity() if setup.scenario.guard.subtract_human else None
+        out = guard.cycle(time, physics.q, physics.qd, time >= _RESET_AT, human)
         log.add(time, physics, out, None, None, bounds)
         if k == start:
             check_start(setup.robot, physics.q, path, keys.start_tolerance)
@@ -101,9 +100,7 @@ def check_start(robot: Robot, q: Array, path: TaughtPath, tolerance: float) -> N
         )
 
 
-def _ratios(
-    setup: WalkSetup, margin: float
-) -> Callable[[Array, Array], tuple[float, float]]:
+def _ratios(setup: WalkSetup, margin: float) -> Callable[[Array, Array], tuple[float, float]]:
     """How much of the guard's bounds, times the margin, motions take."""
     guard = setup.bounds
     qd_bounds, qdd_bounds = np.array(guard.qd_bounds), np.array(guard.qdd_bounds)
@@ -134,7 +131,9 @@ def _approach(setup: WalkSetup, here: Array, there: Array) -> Array:
     duration = max(
         1.875 * fastest / min(speed, setup.scenario.guard.tcp_speed),
         1.875 * float((np.abs(way) / (_APPROACH_SHARE * np.array(guard.qd_bounds))).max()),
-        np.sqrt(5.774 * float((np.abs(way) / (_APPROACH_SHARE * np.array(guard.qdd_bounds))).max())),
+        np.sqrt(
+            5.774 * float((np.abs(way) / (_APPROACH_SHARE * np.array(guard.qdd_bounds))).max())
+        ),
     )
     cycles = int(np.ceil(duration / PERIOD))
     edges = np.linspace(0.0, 1.0, cycles + 1)

@@ -77,9 +77,7 @@ def run_walk(
     """
     about = {"scenario": setup.scenario.to_toml(), "seed": str(seed)}
     with PoseRecorder(recording, about) as recorder:
-        log = teach(
-            setup, seed=seed, recorder=recorder, with_truth=True, on_progress=on_progress
-        )
+        log = teach(setup, seed=seed, recorder=recorder, with_truth=True, on_progress=on_progress)
     if log.trips:
         return WalkResult(log, stops=stops_of(setup, seed) + worst_stops(setup))
     poses = read_poses(recording)
@@ -93,4 +91,3 @@ def _duration(log: WalkLog) -> float:
     """From the signal to start until nothing moves any more [s]."""
     moving = np.flatnonzero(np.abs(log.qd).max(axis=1) > log.rest_speed)
     return float(moving[-1] * PERIOD - START_AT) if len(moving) else 0.0
-

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -35,7 +36,7 @@ class TaughtPath:
 
     @property
     def duration(self) -> float:
-        """[s]"""
+        """Of the whole path, as recorded [s]."""
         return float(self.time[-1])
 
     def at(self, time: Array) -> tuple[Array, Array]:
@@ -54,9 +55,7 @@ class TaughtPath:
         return q, qd
 
 
-def clean(
-    robot: Robot, time: Array, q: Array, *, step: float, tolerance: float
-) -> TaughtPath:
+def clean(robot: Robot, time: Array, q: Array, *, step: float, tolerance: float) -> TaughtPath:
     """The widest smoothing that moves the tool nowhere by more than the tolerance.
 
     Waiting at both ends is cut to 0.1 s; a Gaussian window runs over the joints' positions, ends
@@ -85,7 +84,7 @@ def clean(
     def made(window: float) -> TaughtPath:
         smooth = _smoothed(raw_q, window / period)
         count = int(np.ceil(raw_time[-1] / step)) + 1
-        samples = step * np.arange(count)
+        samples: Array = step * np.arange(count, dtype=np.float64)
         path = TaughtPath(samples, _sampled(raw_time, smooth, samples), raw_time, raw_tool,
                           window, 0.0)  # fmt: skip
         moved = tool_positions(robot, path.at(raw_time)[0]) - raw_tool
@@ -149,7 +148,7 @@ def needed_scale(path: TaughtPath, ratios: Callable[[Array, Array], tuple[float,
             bounds that the recorded timing takes.
     """
     speed, acceleration = ratios(*path.at(path.raw_time))
-    return max(speed, np.sqrt(acceleration))
+    return max(speed, math.sqrt(acceleration))
 
 
 def _smoothed(q: Array, sigma: float) -> Array:

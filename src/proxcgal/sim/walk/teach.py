@@ -53,11 +53,10 @@ def teach(
     last = cycles
     for k in range(cycles):
         time = k * PERIOD
-        out = guard.cycle(time, physics.q, physics.qd, time >= RESET_AT)
-        truth = (
-            physics.truth(setup.monitored_pairs, setup.monitored_ends) if with_truth else None
-        )
-        engaged = ENGAGE_AT <= time and k < release
+        human = physics.human_velocity() if scenario.guard.subtract_human else None
+        out = guard.cycle(time, physics.q, physics.qd, time >= RESET_AT, human)
+        truth = physics.truth(setup.monitored_pairs, setup.monitored_ends) if with_truth else None
+        engaged = time >= ENGAGE_AT and k < release
         if engaged:
             force = hand.force(k - begin, physics.tool_W, physics.tool_R, physics.tool_twist())
         else:
