@@ -360,11 +360,11 @@ def test_a_run_writes_what_the_experiment_asks_for(call: Callable[..., Any]) -> 
 def test_a_campaign_draws_the_same_operators_again_and_finds_no_false_trip(
     call: Callable[..., Any],
 ) -> None:
-    answer = call("campaign", "walkthrough", "--runs", "4", "--workers", "1", "--quiet")
+    answer = call("campaign", "walkthrough", "--runs", "2", "--workers", "1", "--quiet")
     assert answer.code == 0, answer.err
     summary = json.loads(Path("out/campaign-walkthrough/summary.json").read_text())
     assert summary["false_trips"] == summary["missed"] == summary["overruns"] == 0
     assert {name: found["own_function"] for name, found in summary["wishes"].items()} == {
-        "compliant": 1, "overspeed": 1, "too_close": 1, "closing_fast": 1,
+        "compliant": 1, "overspeed": 1,
     }  # fmt: skip
     assert summary["stop_time_s"]["max"] <= 0.35

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib.util
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -44,6 +45,7 @@ def _kr150() -> RobotDescription:
     return _renamed(found, "kr150", "tool0", "tool0")
 
 
+@functools.cache
 def ga_ol() -> CapsuleRobot:
     """The painting arm of [WT] as its capsules, masses and brakes; its lengths are ours."""
     return read_capsule_robot(_GA_OL)

@@ -208,7 +208,7 @@ def verdicts(summary: Summary) -> list[str]:
 def figures(table: pl.DataFrame) -> dict[str, Figure]:
     """Distribution of stop times and distances."""
     done = table.filter(pl.col("error").is_null(), pl.col("tripped") != "none")
-    figure = Figure(figsize=(8.0, 3.4), dpi=DPI, layout="constrained")
+    figure = Figure(figsize=(8.0, 3.7), dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
     for ax, (column, label, bound) in zip(
         figure.subplots(1, 2, sharey=True),
@@ -239,7 +239,8 @@ def figures(table: pl.DataFrame) -> dict[str, Figure]:
         ax.spines[["top", "right"]].set_visible(False)
     figure.axes[0].set_ylabel("share of stops", fontsize=10)
     figure.axes[0].set_ylim(0.0, 1.04)
-    figure.axes[0].legend(frameon=False, fontsize=9, loc="upper left")
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False, fontsize=9)
     return {"stops.png": figure}
 
 
