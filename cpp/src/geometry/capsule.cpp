@@ -30,10 +30,10 @@ Vector3 across(const Vector3& direction) {
 
 /// From b to a; where the axes meet, across both.
 Vector3 normal_of(const Capsule& a, const Capsule& b, const Vector3& apart) {
-  const Vector3 normal = apart.stableNormalized();
+  Vector3 normal = apart.stableNormalized();
   if (normal.squaredNorm() > 0.5) return normal;
   const Vector3 along_a = a.end - a.start, along_b = b.end - b.start;
-  const Vector3 both = along_a.cross(along_b).stableNormalized();
+  Vector3 both = along_a.cross(along_b).stableNormalized();
   if (both.squaredNorm() > 0.5) return both;
   return across(along_a.squaredNorm() >= along_b.squaredNorm() ? along_a : along_b);
 }

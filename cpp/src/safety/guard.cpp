@@ -12,7 +12,7 @@ namespace {
 /// What `accept` names of all contradictions. @throws ConfigError  where it misses one, or names
 /// what is none: a file must not go on accepting what has been mended.
 std::vector<Contradiction> accepted_of(const Robot& robot, const GuardConfig& config) {
-  const std::vector<Contradiction> found = contradictions(robot, config);
+  std::vector<Contradiction> found = contradictions(robot, config);
   std::string lines, items;
   const auto is_accepted = [&](const std::string& item) {
     return std::find(config.accept.begin(), config.accept.end(), item) != config.accept.end();
