@@ -164,7 +164,7 @@ def test_goal_needs_exactly_one_of_offset_and_position(text: str) -> None:
 
 def test_unknown_kind_lists_those_that_exist() -> None:
     (line,) = told(MINIMAL, "kind=hri")
-    assert line == "x.toml: override kind = \"hri\": must be 'static'"
+    assert line == "x.toml: override kind = \"hri\": must be 'static', 'walkthrough' or 'guided'"
 
 
 def test_unknown_name_lists_the_scenarios() -> None:
