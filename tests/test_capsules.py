@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 
 import proxcgal as px
 from proxcgal.errors import ModelError
-from proxcgal.models import fit_capsules, read_capsule_robot
+from proxcgal.models import fit_capsules
 from proxcgal.models.builtin import ga_ol
+from proxcgal.models.capsule_robot import read_capsule_robot
 from proxcgal.models.capsules import capsule_mesh, fit_capsule
 
 Point = tuple[int, int, int]

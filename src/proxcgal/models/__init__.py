@@ -1,7 +1,6 @@
 """Robots and sensor layouts: from description files to what controller and simulator use."""
 
 from proxcgal.models.assembly import attach, attach_mesh
-from proxcgal.models.capsule_robot import CapsuleRobot, read_capsule_robot
 from proxcgal.models.capsules import fit_capsules
 from proxcgal.models.description import RobotDescription
 from proxcgal.models.mounts import MountCheck, MountChecks, check_mounts
@@ -12,7 +11,6 @@ from proxcgal.models.skins import ring_skin
 __all__ = [
     "MountCheck",
     "MountChecks",
-    "CapsuleRobot",
     "Robot",
     "RobotDescription",
     "attach",
@@ -21,7 +19,6 @@ __all__ = [
     "fit_capsules",
     "list_robots",
     "load_robot",
-    "read_capsule_robot",
     "read_description",
     "ring_skin",
 ]

@@ -7,12 +7,15 @@ import importlib.util
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from proxcgal.errors import ModelError
-from proxcgal.models.capsule_robot import CapsuleRobot, read_capsule_robot
 from proxcgal.models.description import Frame, RobotDescription
 from proxcgal.models.limits import LIMITS, Limits
 from proxcgal.models.read import read_description
+
+if TYPE_CHECKING:
+    from proxcgal.models.capsule_robot import CapsuleRobot
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +51,8 @@ def _kr150() -> RobotDescription:
 @functools.cache
 def ga_ol() -> CapsuleRobot:
     """The painting arm of [WT] as its capsules, masses and brakes; its lengths are ours."""
+    from proxcgal.models.capsule_robot import read_capsule_robot  # loads pydantic
+
     return read_capsule_robot(_GA_OL)
 
 

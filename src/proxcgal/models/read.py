@@ -10,7 +10,6 @@ from typing import Any
 from proxcgal.errors import ModelError
 from proxcgal.models import mjcf, urdf
 from proxcgal.models.cache import Cache
-from proxcgal.models.capsule_robot import read_capsule_robot
 from proxcgal.models.description import RobotDescription
 from proxcgal.models.paths import SUFFIXES, MeshFolders, is_robot_file
 from proxcgal.models.reading import WORLD, describe
@@ -45,6 +44,8 @@ def read_description(
     if not is_robot_file(path):
         raise ModelError(f"{path}: {', '.join(SUFFIXES)} are read, not '{path.suffix}'")
     if path.suffix.lower() == ".toml":
+        from proxcgal.models.capsule_robot import read_capsule_robot  # loads pydantic
+
         return read_capsule_robot(path).description(str(path))
     folders = MeshFolders(path, package_dirs, packages)
     cache = Cache("description")

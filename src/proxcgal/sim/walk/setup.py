@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from proxcgal import _core
 from proxcgal.errors import ConfigError
-from proxcgal.models import CapsuleRobot, Robot, load_robot, read_capsule_robot
+from proxcgal.models import Robot, load_robot
 from proxcgal.models.builtin import ga_ol
+from proxcgal.models.capsule_robot import CapsuleRobot, read_capsule_robot
 from proxcgal.sim.physics import OperatorShape, Physics
 from proxcgal.sim.walk.keys import WalkScenario
 
