@@ -1,0 +1,222 @@
+"""A trial that goes on for as long as somebody watches: solids moved by hand, sensors silenced.
+
+The same way through as every trial: source -> injected faults -> tick.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxcgal.models import Robot
+from proxcgal.sim.faults import FaultInjector
+from proxcgal.sim.loop import run_ticks
+from proxcgal.sim.moment import Moment
+from proxcgal.sim.scenario import Scenario
+from proxcgal.sim.scene import Scene
+from proxcgal.sim.setup import Setup
+from proxcgal.sim.solids import Solid
+from proxcgal.sim.source import SimulatedSource
+from proxcgal.sim.ticks import TickInput, TickResult
+from proxcgal.sim.truth import Truth
+from proxcgal.sim.world import World
+
+Array = NDArray[np.float64]
+
+SPEED = 1.0  #: [m/s] at most, of a solid that a hand moves
+STOP = 3  #: the mode that is latched
+_ENDLESS = 1e7  # [s]
+
+
+class Hands:
+    """Solids that somebody holds, by name; each goes where it is wanted, no faster than a bound."""
+
+    def __init__(self, speed: float = SPEED) -> None:
+        """Args: `speed` at most [m/s]."""
+        self._speed = speed
+        self._poses: dict[str, Array] = {}
+        self._wanted: dict[str, Array] = {}
+        self._velocity: dict[str, Array] = {}
+
+    @property
+    def held(self) -> Mapping[str, Array]:
+        """Where the held solids are, (4, 4) T_WO by name."""
+        return self._poses
+
+    def move(self, name: str, now: Array, wanted: Array) -> None:
+        """Takes a solid, where nobody held it, and says where it is to go.
+
+        Args:
+            name: of the solid.
+            now: (4, 4) T_WO where it is.
+            wanted: (4, 4) T_WO; turned at once, moved at bounded speed.
+        """
+        self._poses.setdefault(name, np.array(now))
+        self._wanted[name] = np.array(wanted)
+
+    def release(self) -> None:
+        """Lets all go: each is again where its own way has it."""
+        for kept in (self._poses, self._wanted, self._velocity):
+            kept.clear()
+
+    def advance(self, period: float) -> None:
+        """Moves what is held for so long [s]."""
+        for name, wanted in self._wanted.items():
+            pose = self._poses[name]
+            step = wanted[:3, 3] - pose[:3, 3]
+            far = float(np.linalg.norm(step))
+            step *= min(1.0, self._speed * period / max(far, 1e-12))
+            moved = wanted.copy()
+            moved[:3, 3] = pose[:3, 3] + step
+            self._poses[name] = moved
+            self._velocity[name] = step / period
+
+    def velocity(self, name: str) -> Array:
+        """(3,) of a held solid's origin, in world [m/s]."""
+        return self._velocity.get(name, np.zeros(3))
+
+
+class LiveScene:
+    """A scene some of whose solids are held; the others go their own way."""
+
+    still = False
+
+    def __init__(self, scene: Scene, hands: Hands, since: float = 0.0) -> None:
+        """Args: the scene's own time begins at `since` [s]."""
+        self._scene = scene
+        self._hands = hands
+        self._since = since
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the scene."""
+        return self._scene.names
+
+    @property
+    def solids(self) -> tuple[Solid, ...]:
+        """Of the scene."""
+        return self._scene.solids
+
+    def poses(self, time: float) -> Array:
+        """(n, 4, 4) T_WO."""
+        poses = np.array(self._scene.poses(self._since + time))
+        for name, pose in self._held():
+            poses[self.names.index(name)] = pose
+        return poses
+
+    def twists(self, time: float) -> Array:
+        """(n, 6) in world: velocity of each origin [m/s], angular velocity [rad/s]."""
+        twists = np.array(self._scene.twists(self._since + time))
+        for name, _ in self._held():
+            twists[self.names.index(name)] = (*self._hands.velocity(name), 0.0, 0.0, 0.0)
+        return twists
+
+    def _held(self) -> list[tuple[str, Array]]:
+        return [(name, pose) for name, pose in self._hands.held.items() if name in self.names]
+
+
+class LiveTrial:
+    """A scenario that has no end and takes what somebody does to it, between two ticks."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        controller: str,
+        *,
+        robot: Robot | None = None,
+        q: Array | None = None,
+        hands: Hands | None = None,
+        since: float = 0.0,
+    ) -> None:
+        """Sets everything up.
+
+        Args:
+            scenario: what to run.
+            controller: one of CONTROLLERS.
+            robot: the scenario's, where it is loaded already.
+            q: (n_q,) where the arm starts, instead of the scenario's q0.
+            hands: those that hold solids already.
+            since: of the scene, at the first tick [s].
+
+        Raises:
+            ConfigError: what of the scenario does not fit.
+        """
+        setup = Setup.of(scenario, robot)
+        self.hands = hands or Hands()
+        self.off: frozenset[int] = frozenset()  #: rows of the sensors that are silent
+        self.since = since
+        self.controller = controller
+        scene = LiveScene(setup.scene, self.hands, since)
+        self.setup = setup = replace(
+            setup,
+            scenario=scenario.model_copy(update={"duration": _ENDLESS}),
+            scene=scene,
+            q0=setup.q0 if q is None else np.array(q),
+        )
+        known = setup.known_cloud() if setup.uses_known_points(controller) else None
+        self.law = setup.make_controller(controller, 0 if known is None else len(known))
+        names = [mount.name for mount in setup.skin.mounts]
+        self._faults = FaultInjector(scenario.faults, names, scenario.seed)
+        world = World(setup.robot, scene) if known is None else None
+        source = SimulatedSource(setup, world, scenario.seed)
+        self._truth = Truth(setup.robot, scene)
+        self._count = 0
+        self._ticks = run_ticks(source, self.law, self._spoiled, known)
+        self._last: tuple[TickInput, TickResult] | None = None
+
+    @property
+    def period(self) -> float:
+        """[s] from tick to tick."""
+        return float(self.law.config.period)
+
+    @property
+    def elapsed(self) -> float:
+        """[s] of the scene's time at the last tick."""
+        return self.since + max(self._count - 1, 0) * self.period
+
+    @property
+    def q(self) -> Array:
+        """(n_q,) where the arm is."""
+        return self.setup.q0 if self._last is None else self._last[0].q
+
+    @property
+    def stopped(self) -> bool:
+        """Is the controller in STOP? Nothing that the trial is told leads out of it."""
+        return self._last is not None and self._last[1].mode == STOP
+
+    def step(self) -> TickResult:
+        """One tick."""
+        self.hands.advance(self.period)
+        self._last = next(self._ticks)
+        self._count += 1
+        return self._last[1]
+
+    def __iter__(self) -> Iterator[TickResult]:
+        """Tick after tick, without end."""
+        while True:
+            yield self.step()
+
+    def move(self, name: str, wanted: Array) -> None:
+        """Has a hand take the solid of that name to a pose (4, 4) T_WO; unknown names are passed over."""
+        if name in self.setup.scene.names:
+            row = self.setup.scene.names.index(name)
+            now = self.setup.scene.poses(max(self._count - 1, 0) * self.period)[row]
+            self.hands.move(name, now, wanted)
+
+    def moment(self) -> Moment:
+        """What there is to see now, the true distance with it."""
+        assert self._last is not None, "step() comes first"
+        given, result = self._last
+        now = (self._count - 1) * self.period
+        true = self._truth(given.q, now).distance
+        return Moment.of(self.setup, given, result, self.law, now, true=true, since=self.since)
+
+    def _spoiled(self, given: TickInput) -> TickInput:
+        """What the controller gets: the scenario's faults, and nothing of silent sensors."""
+        given = self._faults(given)
+        if not self.off:
+            return given
+        return replace(given, scans=tuple(s for s in given.scans if s.sensor not in self.off))
