@@ -1,8 +1,14 @@
 """The live trial behind the page: hands, silent sensors, what a page may choose, how it is told."""
 
 import multiprocessing
+import re
 import time as clock
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,15 +16,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import proxcgal as px
-from proxcgal.apps.view.choice import Choice
+from proxcgal.apps.view.choice import Choice, robots
 from proxcgal.apps.view.desk import ROOM, Desk
 from proxcgal.apps.view.simulation import Told, Wishes, simulate
-from proxcgal.apps.view.stage import Stage
 from proxcgal.models.display import display_meshes
 from proxcgal.sim.frames import pose
 from proxcgal.sim.live import STOP, Hands, LiveScene, LiveTrial
 from proxcgal.sim.moment import without
 from proxcgal.sim.scenario import Scenario, load_scenario
+from proxcgal.sim.scenario_keys import Fault
 from proxcgal.sim.trial import run_trial
 
 RNG = np.random.default_rng(1)
@@ -87,47 +93,169 @@ def test_an_obstacle_moved_to_the_flange_raises_activation_and_the_arm_goes_away
     assert live.moment().true > 0.05
 
 
-def test_a_silent_sensor_is_missed_by_the_cloud_and_by_the_monitor(front: Scenario) -> None:
+def test_what_a_silent_sensor_saw_last_is_held_and_the_monitor_misses_it(front: Scenario) -> None:
     live = LiveTrial(front, "wb")
     for _ in range(100):
         live.step()
-    seeing = {int(row) for row in live.law.cloud_origins()[:, 0]}
-    assert seeing
-    live.off = frozenset(seeing)
+    whole = live.moment()
+    rows, counts = np.unique(live.law.cloud_origins()[:, 0], return_counts=True)
+    live.off = frozenset([int(rows[0])])
     for _ in range(30):
         result = live.step()
-    assert not seeing & {int(row) for row in live.law.cloud_origins()[:, 0]}
-    assert result.mode > 0
+    held = live.moment()
+    assert len(held.held_W) == counts[0]
+    assert np.isin(held.held_W, whole.kept_W).all()
+    assert not np.isin(held.kept_W, whole.kept_W).all()
+    assert result.mode == 1
+    assert "sensor_silent" in held.found
 
 
 def test_nothing_that_a_page_says_leads_out_of_a_stop(cell: Scenario) -> None:
-    link, process = started(cell)
-    try:
-        speak(link, Wishes(running=False))
-        stopping = cell.model_copy(update={"faults": (_broken_joints(),)})
-        assert stopping
-    finally:
+    old_joints = Fault.model_validate({"kind": "joints_old", "value": 1.0, "from": 0.5, "to": 0.6})
+    with started(cell.model_copy(update={"faults": (old_joints,)})) as link:
+        listen(link, lambda told: told.moment and told.moment.mode == STOP)
+        choice = Choice.of(cell, "wb")
+        link.send(Wishes(reset=True))
+        link.send(Wishes(choice=replace(choice, controller="sm"), release=True, off=frozenset()))
+        link.send(Wishes(running=False, steps=3))
+        told = listen(link, lambda told: not told.running and told.moment)
+        assert told.moment.mode == STOP
+        assert told.moment.elapsed >= 0.5
+        link.send(Wishes(anew=True, running=True))  # whoever started the command
+        anew = listen(link, lambda told: told.moment and told.moment.mode < STOP)
+        assert anew.moment.elapsed < 0.5
+
+
+def test_a_page_that_takes_nothing_does_not_slow_the_simulation(cell: Scenario) -> None:
+    with started(cell) as link:
+        listen(link, lambda told: told.stage)
+        clock.sleep(1.5)  # moments that are not fetched
+        first = listen(link, lambda told: told.moment)
+        later = listen(link, lambda told: told.moment)
+        assert first.moment is not None
+        assert later.moment is not None
+        assert later.dropped >= 5
+        assert later.moment.elapsed > first.moment.elapsed + 0.5
+
+
+def test_the_simulation_ends_with_its_page(cell: Scenario) -> None:
+    with started(cell) as link:
+        listen(link, lambda told: told.moment)
         link.close()
-        process.join(5.0)
+    assert multiprocessing.active_children() == []
 
 
-def _broken_joints() -> object:
-    from proxcgal.sim.scenario_keys import Fault
+def test_pause_step_and_reset(cell: Scenario) -> None:
+    with started(cell) as link:
+        link.send(Wishes(running=False))
+        paused = listen(link, lambda told: told.moment and not told.running).moment
+        link.send(Wishes(steps=7))
+        stepped = listen(link, lambda told: told.moment and told.moment.elapsed > paused.elapsed)
+        assert stepped.moment is not None
+        assert stepped.moment.elapsed == pytest.approx(paused.elapsed + 0.07)
+        link.send(Wishes(reset=True))
+        again = listen(link, lambda told: told.moment and told.moment.elapsed < 0.07)
+        assert np.array_equal(again.moment.q, cell.q0)
 
-    return Fault(**{"kind": "joints_old", "value": 1.0, "from": 0.1, "to": 0.3})
+
+def test_another_choice_goes_on_where_the_arm_is(front: Scenario) -> None:
+    with started(front) as link:
+        before = listen(link, lambda told: told.moment and told.moment.elapsed > 0.5).moment
+        choice = replace(Choice.of(front, "wb"), d_min=0.3, controller="sm")
+        link.send(Wishes(choice=choice))
+        stage = listen(link, lambda told: told.stage)
+        after = listen(link, lambda told: told.moment).moment
+    assert stage.choice == choice
+    assert stage.stage is not None
+    assert stage.stage.d_min == 0.3
+    assert np.abs(after.q - before.q).max() < 0.5
+    assert after.elapsed > before.elapsed
 
 
-def started(scenario: Scenario, controller: str = "wb"):  # type: ignore[no-untyped-def]
-    """A simulation in its process, and the link to it."""
+def test_every_robot_with_sensors_can_stand_in_a_scene(front: Scenario) -> None:
+    assert {"ur10e", "panda"} <= set(robots(front))
+    changed = replace(Choice.of(front, "wb"), robot="panda", vertices=100).applied(front)
+    assert (changed.robot, len(changed.q0)) == ("panda", 7)
+    assert changed.obstacles == front.obstacles
+
+
+def test_without_noise_the_ranges_are_exact(front: Scenario) -> None:
+    quiet = replace(Choice.of(front, "wb"), noise=False).applied(front)
+    settings = quiet.simulation
+    assert (settings.sigma_ratio, settings.sigma_floor, settings.dropout, settings.bias) == (0,) * 4
+    assert quiet.controller.monitor.suspect_repeats == 0
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"controller": "none"}, "controller = 'none': there are wb"),
+        ({"robot": "/etc/passwd"}, "robot = '/etc/passwd': there are ur10e"),
+        ({"vertices": 10**9}, "vertices"),
+        ({"d_min": 0.0}, "d_min = 0: from 0.05"),
+        ({"d_min": float("nan")}, "d_min = nan"),
+        ({"buffer": -1.0}, "buffer"),
+        ({"gain": 1e9}, "gain"),
+    ],
+)
+def test_what_the_page_does_not_offer_cannot_be_chosen(
+    front: Scenario, change: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(px.ConfigError, match=re.escape(message)):
+        replace(Choice.of(front, "wb"), **change).applied(front)
+
+
+def test_the_last_wish_counts_and_the_room_has_walls() -> None:
+    desk = Desk()
+    assert desk.take() is None
+    desk.want(running=True)
+    desk.want(running=False, steps=1)
+    desk.want(steps=2)
+    desk.move("panel", pose((1.0, 0.0, 0.0)))
+    desk.move("panel", pose((1e9, 0.0, -1e9)))
+    wishes = desk.take()
+    assert wishes is not None
+    assert (wishes.running, wishes.steps) == (False, 3)
+    ((name, T_WO),) = wishes.hands
+    assert name == "panel"
+    assert T_WO[:3, 3].tolist() == [ROOM[1, 0], 0.0, ROOM[0, 2]]
+    assert desk.take() is None
+
+
+@given(st.integers(0, 40), st.integers(0, 40))
+def test_removed_points_are_those_of_the_raw_cloud_that_were_not_kept(kept: int, gone: int) -> None:
+    points = RNG.normal(size=(kept + gone, 3))
+    order = RNG.permutation(kept + gone)
+    left = without(points[order], points[:kept])
+    assert sorted(map(tuple, left)) == sorted(map(tuple, points[kept:]))
+
+
+def test_display_meshes_are_light_and_near_the_full_ones() -> None:
+    robot = px.load_robot("ur10e")
+    for link, (vertices_L, triangles) in zip(robot.link_names, display_meshes(robot), strict=True):
+        assert len(vertices_L) <= 1100
+        full, _ = robot.full_mesh(link)
+        distances, *_ = px.MeshTree(vertices_L, triangles).closest(full[::50])
+        assert distances.max() < 0.003
+
+
+@contextmanager
+def started(scenario: Scenario, controller: str = "wb") -> Iterator[Connection]:
+    """A simulation in its process: the link to it."""
     context = multiprocessing.get_context("spawn")
     link, theirs = context.Pipe()
     process = context.Process(target=simulate, args=(theirs, scenario, controller), daemon=True)
     process.start()
     theirs.close()
-    return link, process
+    try:
+        yield link
+    finally:
+        link.close()
+        process.join(10.0)
+        assert not process.is_alive()
 
 
-def listen(link, until, seconds: float = 30.0) -> Told:  # type: ignore[no-untyped-def]
+def listen(link: Connection, until: Callable[[Told], Any], seconds: float = 40.0) -> Any:
     """Takes what is told until that is true of it."""
     end = clock.monotonic() + seconds
     while clock.monotonic() < end:
@@ -139,7 +267,3 @@ def listen(link, until, seconds: float = 30.0) -> Told:  # type: ignore[no-untyp
             if until(told):
                 return told
     raise AssertionError("nothing of the kind was told in time")
-
-
-def speak(link, wishes: Wishes) -> None:  # type: ignore[no-untyped-def]
-    link.send(wishes)

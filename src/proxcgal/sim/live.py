@@ -212,7 +212,9 @@ class LiveTrial:
         given, result = self._last
         now = (self._count - 1) * self.period
         true = self._truth(given.q, now).distance
-        return Moment.of(self.setup, given, result, self.law, now, true=true, since=self.since)
+        return Moment.of(
+            self.setup, given, result, self.law, now, true=true, since=self.since, off=self.off
+        )
 
     def _spoiled(self, given: TickInput) -> TickInput:
         """What the controller gets: the scenario's faults, and nothing of silent sensors."""

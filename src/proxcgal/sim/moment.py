@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Self
 
@@ -27,7 +28,8 @@ class Moment:
     links_W: Array  #: (links, 4, 4) T_WL
     solids_W: Array  #: (solids, 4, 4) T_WO
     goal_W: Array  #: (4, 4) T_WT
-    kept_W: Points  #: (n, 3) the filtered cloud [m]
+    kept_W: Points  #: (n, 3) the filtered cloud, without `held_W` [m]
+    held_W: Points  #: (n, 3) of it, what sensors that are silent now saw last [m]
     removed_W: Points  #: (n, 3) of the raw cloud, what was taken for the arm [m]
     control_W: tuple[float, ...] | None  #: (3,) the point that avoidance moves
     obstacle_W: tuple[float, ...] | None  #: (3,) the point that it moves away from
@@ -51,6 +53,7 @@ class Moment:
         *,
         true: float,
         since: float = 0.0,
+        off: Collection[int] = (),
     ) -> Self:
         """Of a tick that `law` has just made.
 
@@ -62,15 +65,18 @@ class Moment:
             time: the scene's, for its poses [s].
             true: distance from scene to robot [m].
             since: added to `time` in what is shown [s].
+            off: rows of the sensors that are silent.
         """
         kept, raw = law.cloud_W(), law.raw_cloud_W()
+        held = np.isin(law.cloud_origins()[:, 0], list(off))
         return cls(
             elapsed=since + time,
             q=given.q,
             links_W=np.asarray(setup.robot.link_poses(given.q)),
             solids_W=np.asarray(setup.scene.poses(time)),
             goal_W=given.goal,
-            kept_W=kept.astype(np.float32),
+            kept_W=kept[~held].astype(np.float32),
+            held_W=kept[held].astype(np.float32),
             removed_W=without(raw, kept).astype(np.float32),
             control_W=result.control_W,
             obstacle_W=result.obstacle_W,

@@ -271,7 +271,8 @@ def _status(told: Told, moment: Moment, note: str) -> str:
         + (f", {100.0 * told.real_time:.0f} % of real time" if told.real_time < 0.97 else ""),
         f"seen {seen}, true {true}, activation {moment.activation:.2f}",
         f"moves {moment.link or 'nothing'}",
-        f"{len(moment.kept_W)} points kept, {len(moment.removed_W)} removed",
+        f"{len(moment.kept_W)} points kept, {len(moment.removed_W)} removed"
+        + (f", {len(moment.held_W)} of silent sensors" if len(moment.held_W) else ""),
         f"tick {told.cpu_us:.0f} us of CPU, late by {told.late_us[0] / 1e3:.1f} ms (p99 "
         f"{told.late_us[1] / 1e3:.0f})",
     ]

@@ -65,6 +65,7 @@ class Drawing:
             ]
             self._place(self._solids, stage.solids_W)
             self._kept = self._cloud("kept", KEPT, 0.009)
+            self._held = self._cloud("held", SILENT, 0.009)
             self._removed = self._cloud("removed", REMOVED, 0.006)
             self._goal = scene.add_frame(
                 f"{name}/goal", axes_length=0.12, axes_radius=0.005, visible=False
@@ -82,6 +83,7 @@ class Drawing:
             return
         self._place(self._solids, moment.solids_W)
         self._points(self._kept, moment.kept_W)
+        self._points(self._held, moment.held_W)
         self._points(self._removed, moment.removed_W)
         self._put(self._goal, moment.goal_W)
         _shown(self._goal, True)
@@ -109,7 +111,7 @@ class Drawing:
         for handle in (*self._links, *self._solids, self._arrow):
             handle.remove()
         if not self._ghost:
-            for handle in (self._kept, self._removed, self._goal):
+            for handle in (self._kept, self._held, self._removed, self._goal):
                 handle.remove()
 
     def _link(self, row: int, link: str) -> Any:
@@ -155,7 +157,7 @@ class Drawing:
         )  # fmt: skip
 
     def _points(self, cloud: Any, points_W: NDArray[np.float32]) -> None:
-        on = self._kept_on if cloud is self._kept else self._removed_on
+        on = self._removed_on if cloud is self._removed else self._kept_on
         _shown(cloud, on and len(points_W) > 0)
         if on and len(points_W):
             cloud.points = points_W.astype(np.float16)

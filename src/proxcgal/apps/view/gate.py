@@ -205,6 +205,7 @@ def serve(
                 "max_size": gate.bounds.message_bytes,
                 "max_queue": 16,
                 "open_timeout": 10,
+                "close_timeout": 2,
                 "ping_interval": 10,
                 "ping_timeout": 20,
                 "create_connection": _connections(gate),
