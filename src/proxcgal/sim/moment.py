@@ -48,7 +48,7 @@ class Moment:
         setup: Setup,
         given: TickInput,
         result: TickResult,
-        law: _core.Controller,
+        law: _core.Controller | None,
         time: float,
         *,
         true: float,
@@ -61,14 +61,16 @@ class Moment:
             setup: of the run.
             given: the tick's inputs.
             result: its answer.
-            law: the controller, whose clouds are copied.
+            law: the controller, whose clouds are copied; None: clouds are not known.
             time: the scene's, for its poses [s].
             true: distance from scene to robot [m].
             since: added to `time` in what is shown [s].
             off: rows of the sensors that are silent.
         """
-        kept, raw = law.cloud_W(), law.raw_cloud_W()
-        held = np.isin(law.cloud_origins()[:, 0], list(off))
+        kept, raw, held = np.empty((0, 3)), np.empty((0, 3)), np.empty(0, bool)
+        if law is not None:
+            kept, raw = law.cloud_W(), law.raw_cloud_W()
+            held = np.isin(law.cloud_origins()[:, 0], list(off))
         return cls(
             elapsed=since + time,
             q=given.q,
