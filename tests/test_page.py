@@ -107,7 +107,7 @@ def test_a_sensor_that_is_switched_off_leaves_the_cloud(live: Live) -> None:
     before = live.moment
     assert len(before.held_W) == 0
     page.get_by_text("sensors", exact=True).click()
-    for row in range(10):
+    for row in (1, 2, 3):
         page.get_by_label(f"forearm_link/ring2/{row}", exact=True).click()
     assert until(lambda: len(live.moment.held_W) > 5)
     live.passed(0.5)

@@ -81,8 +81,9 @@ def test_the_time_line_scrubs(
 
 
 def test_the_command_serves_a_recording_until_it_is_interrupted(recording: Recording) -> None:
-    command = [sys.executable, "-m", "proxcgal.apps.cli", "replay", str(recording.path), "--view",
-               "--port", "0"]  # fmt: skip
+    program = "import sys; from proxcgal.apps.cli import main; sys.exit(main())"
+    options = ["replay", str(recording.path), "--view", "--port", "0"]
+    command = [sys.executable, "-c", program, *options]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         lines = [process.stdout.readline() for _ in range(2)]
