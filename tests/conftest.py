@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+
 from browser import Tab, chromium
 
 import proxcgal as px

@@ -7,12 +7,12 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 
+from browser import Tab, pixel, until
 from proxcgal.apps.view.controls import HANDLE
 from proxcgal.apps.view.gate import close, serve
 from proxcgal.apps.view.live import LivePage
 from proxcgal.sim.moment import Moment
 from proxcgal.sim.scenario import load_scenario
-from browser import Tab, pixel, until
 
 
 class Live:
@@ -50,9 +50,7 @@ class Live:
 
 
 @pytest.fixture(scope="module")
-def live(
-    open_tab: Callable[[], Tab], tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[Live]:
+def live(open_tab: Callable[[], Tab], tmp_path_factory: pytest.TempPathFactory) -> Iterator[Live]:
     live = Live(tmp_path_factory.mktemp("page"), open_tab)
     try:
         yield live
@@ -156,4 +154,3 @@ def test_a_browser_needs_the_token_and_keeps_it(open_tab: Callable[[], Tab]) -> 
         tab.page.close()
     finally:
         close(server)
-

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browser import Tab, until
 
+from browser import Tab, until
 from proxcgal.apps.view.gate import close, serve
 from proxcgal.apps.view.replay_page import ReplayPage, said
 from proxcgal.apps.view.replayed import replayed

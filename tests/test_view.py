@@ -61,8 +61,8 @@ def test_a_held_solid_goes_where_it_is_wanted_at_bounded_speed() -> None:
 
 
 def test_what_nobody_holds_goes_its_own_way(front: Scenario) -> None:
-    table = front.obstacles[0].model_dump() | {"name": "cart", "path": ((0.0, 0.827, 0.1742, 0.6),
-                                                                        (2.0, 2.827, 0.1742, 0.6))}  # fmt: skip
+    path = ((0.0, 0.827, 0.1742, 0.6), (2.0, 2.827, 0.1742, 0.6))
+    table = front.obstacles[0].model_dump() | {"name": "cart", "path": path}
     moving = front.model_copy(
         update={"obstacles": (*front.obstacles, type(front.obstacles[0])(**table))}
     )

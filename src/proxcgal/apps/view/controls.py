@@ -58,12 +58,15 @@ class Controls:
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
         gui.main_panel.dock_right()
         self._status = gui.add_markdown("setting up ...")
-        self._buttons("simulation", {
-            "run": lambda: desk.want(running=True),
-            "pause": lambda: desk.want(running=False),
-            "step": lambda: desk.want(running=False, steps=1),
-            "reset": lambda: desk.want(reset=True),
-        })
+        self._buttons(
+            "simulation",
+            {
+                "run": lambda: desk.want(running=True),
+                "pause": lambda: desk.want(running=False),
+                "step": lambda: desk.want(running=False, steps=1),
+                "reset": lambda: desk.want(reset=True),
+            },
+        )
         self.plots = Plots(gui)
         with gui.add_folder("controller"):
             self._lists = {
@@ -196,7 +199,9 @@ class Controls:
             self._desk.want(choice=self._choice)
 
     def _hook_choices(self) -> None:
-        read = {"vertices": _number_of, **dict.fromkeys(("controller", "robot"), str)}
+        read: dict[str, Callable[[Any], Any]] = {
+            "vertices": _number_of, "controller": str, "robot": str,
+        }  # fmt: skip
         for name, control in (*self._lists.items(), *self._sliders.items()):
 
             async def changed(event: Any, name: str = name) -> None:

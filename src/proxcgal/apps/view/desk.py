@@ -48,4 +48,3 @@ class Desk:
             wishes = Wishes(**self._wanted, hands=tuple(self._hands.items()))
             self._wanted, self._hands = {}, {}
             return wishes
-

@@ -30,7 +30,7 @@ SENSOR: Color = (250, 204, 40)
 SILENT: Color = (120, 120, 120)
 _VIEW: Color = (214, 176, 60)
 _FRUSTUM = 0.10  # [m] of a field of view that is drawn, along its axis
-_SHAFT = {"shaft_radius": 0.008, "head_radius": 0.02, "head_length": 0.05}
+_SHAFT: dict[str, Any] = {"shaft_radius": 0.008, "head_radius": 0.02, "head_length": 0.05}
 _NOTHING = np.zeros((1, 3), np.float32)  # clouds and arrows are never empty: they are hidden
 
 
@@ -52,9 +52,7 @@ class Drawing:
         self.stage = stage
         self._ghost = ghost
         self._name = name
-        self._links = [
-            self._link(row, link) for row, link in enumerate(stage.links)
-        ]
+        self._links = [self._link(row, link) for row, link in enumerate(stage.links)]
         self._views: list[tuple[list[int], Any, Any]] = []
         self._solids: list[Any] = []
         if not ghost:
@@ -127,7 +125,9 @@ class Drawing:
         """Below each link that carries some: their places, and the edges of their views."""
         made = []
         corners = _FRUSTUM * np.tan(0.5 * self.stage.field_of_view)
-        ends_S = np.array([[x, y, _FRUSTUM] for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))], float)
+        ends_S = np.array(
+            [[x, y, _FRUSTUM] for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))], float
+        )
         ends_S[:, :2] *= corners
         for link in sorted(set(self.stage.sensor_links)):
             rows = [row for row, on in enumerate(self.stage.sensor_links) if on == link]
@@ -184,7 +184,8 @@ class Drawing:
 
 def pose_parts(T_WO: Array) -> tuple[Array, Array]:
     """Quaternion (4,), w first, and position (3,) of a pose (4, 4)."""
-    return viser.transforms.SO3.from_matrix(T_WO[:3, :3]).wxyz, T_WO[:3, 3].copy()
+    rotation = viser.transforms.SO3.from_matrix(T_WO[:3, :3])
+    return np.asarray(rotation.wxyz, np.float64), T_WO[:3, 3].copy()
 
 
 def furnish(server: viser.ViserServer, stage: Stage) -> None:
@@ -240,9 +241,7 @@ def _solid(scene: viser.SceneApi, name: str, solid: Solid) -> Any:
     assert isinstance(solid, Capsule)
     shape = trimesh.creation.capsule(height=solid.length, radius=solid.radius, count=(16, 16))
     shape.apply_translation(-shape.bounds.mean(axis=0))
-    return scene.add_mesh_simple(
-        name, np.asarray(shape.vertices), np.asarray(shape.faces), **plain
-    )
+    return scene.add_mesh_simple(name, np.asarray(shape.vertices), np.asarray(shape.faces), **plain)
 
 
 def _shown(handle: Any, visible: bool) -> None:

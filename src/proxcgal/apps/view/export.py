@@ -55,5 +55,5 @@ def exported(first: Played, ghosts: Sequence[Played] = ()) -> bytes:
 
 
 def player() -> str:
-    """viser's client: one HTML file that fetches nothing."""
+    """Viser's client: one HTML file that fetches nothing."""
     return (Path(viser.__file__).parent / "client" / "build" / "index.html").read_text()

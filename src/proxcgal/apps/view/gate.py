@@ -150,9 +150,7 @@ class Gate:
             shown.append(kept.value)
         return any(hmac.compare_digest(s.encode(), self.token.encode()) for s in shown)
 
-    def _refuse(
-        self, reason: str, status: http.HTTPStatus = http.HTTPStatus.FORBIDDEN
-    ) -> Response:
+    def _refuse(self, reason: str, status: http.HTTPStatus = http.HTTPStatus.FORBIDDEN) -> Response:
         self.refused += 1
         body = f"{status.value} {status.phrase}: {reason}\n".encode()
         headers = Headers({"Content-Type": "text/plain; charset=utf-8", "Connection": "close",
@@ -267,7 +265,7 @@ def _connections(gate: Gate) -> type[ServerConnection]:
 
 
 def _check_free(host: str, port: int) -> None:
-    """viser takes the next port where one is taken; a page elsewhere than told helps nobody."""
+    """Viser takes the next port where one is taken; a page elsewhere than told helps nobody."""
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(
             host, port, type=socket.SOCK_STREAM
@@ -347,7 +345,7 @@ def _quaternion(value: object, bounds: Bounds) -> bool:
     if not _vector(4)(value, bounds):
         return False
     assert isinstance(value, list)
-    return 0.9 < sum(each * each for each in value) < 1.1
+    return 0.9 < float(sum(each * each for each in value)) < 1.1
 
 
 def _updates(value: object, bounds: Bounds) -> bool:

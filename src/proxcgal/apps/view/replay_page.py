@@ -55,7 +55,7 @@ class ReplayPage:
         gui.main_panel.dock_right()
         gui.add_markdown(words)
         end = float(self._times[-1])
-        self._line = gui.add_slider("time [s]", 0.0, max(end, 0.01), 0.01, 0.0)
+        self._line: Any = gui.add_slider("time [s]", 0.0, max(end, 0.01), 0.01, 0.0)
         gate.offer(self._line, between(0.0, end))
         buttons = gui.add_button_group("replay", ("play", "pause", "back", "next"))
         gate.offer(buttons, one_of(("play", "pause", "back", "next")))

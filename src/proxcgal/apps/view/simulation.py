@@ -257,4 +257,3 @@ class _Simulation:
 
     def _note(self, text: str) -> None:
         self._outbox.tell(Told(note=text, running=self._running))
-

@@ -65,4 +65,11 @@ class Stage:
     @property
     def key(self) -> tuple[Any, ...]:
         """The same for stages that need no drawing anew."""
-        return self.robot, self.links, self.sensors, self.names, self.solids, self.sensors_L.tobytes()
+        return (
+            self.robot,
+            self.links,
+            self.sensors,
+            self.names,
+            self.solids,
+            self.sensors_L.tobytes(),
+        )
