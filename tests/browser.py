@@ -63,7 +63,7 @@ class Tab:
 
 
 @contextmanager
-def chromium(width: int = 1000, height: int = 640) -> Iterator[Callable[[], Tab]]:
+def chromium(width: int = 900, height: int = 560) -> Iterator[Callable[[], Tab]]:
     """Opens tabs of one browser; skips the test where there is none."""
     program = shutil.which("chromium")
     playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright")

@@ -70,6 +70,16 @@ def say(connection: ClientConnection, message: object) -> None:
     connection.send(msgspec.msgpack.encode(message))
 
 
+def hear(connection: ClientConnection) -> None:
+    while True:
+        connection.recv(timeout=5.0)
+
+
+def flood(connection: ClientConnection) -> None:
+    for _ in range(100_000):
+        say(connection, CAMERA)
+
+
 def until(condition: Any, seconds: float = 5.0) -> bool:
     end = clock.monotonic() + seconds
     while clock.monotonic() < end:
@@ -183,8 +193,7 @@ def test_a_message_too_large_ends_its_connection_and_no_other(open_page: Served)
         say(good, CAMERA)
         bad.send(bytes(100_000))
         with pytest.raises(ConnectionClosed, match="1009"):
-            while True:
-                bad.recv(timeout=5.0)
+            hear(bad)
         say(good, open_page.set_slider(0.35))
         assert until(lambda: open_page.slider.value == 0.35)
 
@@ -193,8 +202,7 @@ def test_a_flood_ends_its_connection_and_no_other(open_page: Served) -> None:
     with open_page.connect() as good, open_page.connect() as bad:
         say(good, CAMERA)
         with pytest.raises(ConnectionClosed):
-            for _ in range(100_000):
-                say(bad, CAMERA)
+            flood(bad)
         say(good, open_page.set_slider(0.25))
         assert until(lambda: open_page.slider.value == 0.25)
     assert until(lambda: open_page.gate.viewers == 0)

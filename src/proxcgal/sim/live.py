@@ -200,7 +200,7 @@ class LiveTrial:
             yield self.step()
 
     def move(self, name: str, wanted: Array) -> None:
-        """Has a hand take the solid of that name to a pose (4, 4) T_WO; unknown names are passed over."""
+        """Has a hand take a solid to a pose (4, 4) T_WO; unknown names are passed over."""
         if name in self.setup.scene.names:
             row = self.setup.scene.names.index(name)
             now = self.setup.scene.poses(max(self._count - 1, 0) * self.period)[row]

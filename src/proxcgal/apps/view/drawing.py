@@ -142,7 +142,8 @@ class Drawing:
                 f"{place}/views", np.array(edges), _VIEW, thickness=1.0, thickness_units="screen"
             )
             dots = self._scene.add_point_cloud(
-                f"{place}/sensors", self.stage.sensors_L[rows, :3, 3], np.array([SENSOR] * len(rows)),
+                f"{place}/sensors", self.stage.sensors_L[rows, :3, 3],
+                np.array([SENSOR] * len(rows)),
                 point_size=0.014, point_shape="circle", point_shading="flat", precision="float32",
             )  # fmt: skip
             made.append((rows, frusta, dots))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import viser
@@ -45,7 +46,7 @@ def exported(first: Played, ghosts: Sequence[Played] = ()) -> bytes:
         for drawing, moment in zip(drawings, played[0], strict=True):
             drawing.show(moment)
         recorded = server.get_scene_serializer()
-        for before, now in zip(played, played[1:], strict=False):
+        for before, now in pairwise(played):
             recorded.insert_sleep(now[0].elapsed - before[0].elapsed)
             for drawing, moment in zip(drawings, now, strict=True):
                 drawing.show(moment)

@@ -137,9 +137,9 @@ class LivePage:
         assert told.moment is not None
         shown = (*self._controls.shown, self._controls.off)
         if shown != self._shown:
-            views, kept, removed, off = shown
-            drawing.views_visible(bool(views))
-            drawing.clouds_visible(bool(kept), bool(removed))
+            views, kept, removed = self._controls.shown
+            drawing.views_visible(views)
+            drawing.clouds_visible(kept, removed)
             drawing.silence(self._controls.off)
             self._shown = shown
         drawing.show(told.moment)

@@ -1,4 +1,4 @@
-"""A recording in the browser: a time line to scrub, and what other settings would have commanded."""
+"""A recording in the browser: a time line to scrub, other settings' commands beside it."""
 
 from __future__ import annotations
 
