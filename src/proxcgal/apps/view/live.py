@@ -44,6 +44,7 @@ class LivePage:
         """
         self.desk = Desk()
         self.told = Told()  #: the last moment that was drawn
+        self.drawn = 0  #: moments so far
         self._server = server
         self._controls = Controls(server, gate, self.desk, scenario, controller)
         self._drawing: Drawing | None = None
@@ -143,6 +144,7 @@ class LivePage:
             drawing.silence(self._controls.off)
             self._shown = shown
         drawing.show(told.moment)
+        self.drawn += 1
         self._controls.told(told, drawing)
         self._controls.plots.add(told.moment)
         now = clock.monotonic()
