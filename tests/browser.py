@@ -20,6 +20,7 @@ FLAGS = [
 ]  # fmt: skip
 #: Pictures that the tests make are kept here, where it is set.
 PICTURES = os.environ.get("PROXCGAL_PICTURES")
+SIZE = (1100, 680) if PICTURES else (800, 520)  # [px]
 
 
 class Tab:
@@ -63,7 +64,7 @@ class Tab:
 
 
 @contextmanager
-def chromium(width: int = 900, height: int = 560) -> Iterator[Callable[[], Tab]]:
+def chromium(width: int = SIZE[0], height: int = SIZE[1]) -> Iterator[Callable[[], Tab]]:
     """Opens tabs of one browser; skips the test where there is none."""
     program = shutil.which("chromium")
     playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright")
