@@ -4,7 +4,7 @@ import socket
 import time as clock
 import urllib.error
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import msgspec
@@ -17,7 +17,8 @@ from websockets.sync.client import ClientConnection, connect
 
 import proxcgal as px
 from proxcgal.apps.view import address, checked_token
-from proxcgal.apps.view.gate import Bounds, Gate, between, close, one_of, serve, switch
+from proxcgal.apps.view.gate import Gate, close, serve
+from proxcgal.apps.view.messages import Bounds, between, one_of, switch
 
 SPOKEN = f"viser-v{viser.__version__}"
 TOKEN = "correct-horse-battery"
@@ -222,6 +223,7 @@ def test_more_pages_than_allowed_are_told_so_and_one_that_leaves_makes_room() ->
     served = Served(bounds=Bounds(viewers=2))
     try:
         with served.connect() as first, served.connect():
+            assert until(lambda: served.gate.viewers == 2)
             with pytest.raises(InvalidStatus, match="503"):
                 served.connect()
             first.close()
@@ -273,3 +275,22 @@ def test_beyond_this_machine_there_is_a_warning_and_always_a_token() -> None:
 def test_a_token_that_cannot_be_is_refused(token: str) -> None:
     with pytest.raises(px.ConfigError, match="--token"):
         checked_token("127.0.0.1", 8080, token)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["no_such_scene"], "no_such_scene"),
+        (["front_plane", "--port", "70000"], "--port 70000: must be 0 to 65535"),
+        (["front_plane", "--token", "short"], "--token 'short': must be 8 characters or more"),
+        (["front_plane", "--host", "no such host", "--port", "0"], "cannot be listened on"),
+        (["front_plane", "--set", "controller.d_min=-1"], "controller.d_min"),
+    ],
+)
+def test_what_cannot_be_viewed_is_told_in_a_line(
+    call: Callable[..., Any], options: list[str], message: str
+) -> None:
+    answer = call("view", *options)
+    assert answer.code == 2
+    assert message in answer.err
+    assert "Traceback" not in answer.err

@@ -21,7 +21,8 @@ from proxcgal.apps.view.desk import ROOM, Desk
 from proxcgal.apps.view.simulation import Told, Wishes, simulate
 from proxcgal.models.display import display_meshes
 from proxcgal.sim.frames import pose
-from proxcgal.sim.live import STOP, Hands, LiveScene, LiveTrial
+from proxcgal.sim.hands import Hands, LiveScene
+from proxcgal.sim.live import STOP, LiveTrial
 from proxcgal.sim.moment import without
 from proxcgal.sim.scenario import Scenario, load_scenario
 from proxcgal.sim.scenario_keys import Fault

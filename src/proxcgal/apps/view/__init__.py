@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import secrets
 import sys
 import warnings
@@ -61,6 +62,7 @@ def view_command(options: ViewOptions, command: str) -> int:
         options.host, options.port, label=f"proxcgal: {scenario.name}", token=token
     )
     page = LivePage(server, gate, scenario, options.controller)
+    os.nice(5)  # the page yields to the simulation, which has its process by now
     try:
         print(address(options.host, server.get_port(), token), flush=True)
         _attend(page)

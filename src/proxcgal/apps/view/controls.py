@@ -21,7 +21,8 @@ from proxcgal.apps.view.choice import (
 )
 from proxcgal.apps.view.desk import ROOM, Desk
 from proxcgal.apps.view.drawing import Drawing, pose_parts
-from proxcgal.apps.view.gate import Gate, between, one_of, switch
+from proxcgal.apps.view.gate import Gate
+from proxcgal.apps.view.messages import between, one_of, switch
 from proxcgal.apps.view.plots import Plots
 from proxcgal.apps.view.simulation import Told
 from proxcgal.apps.view.stage import Stage

@@ -10,7 +10,8 @@ from pathlib import Path
 import viser
 
 from proxcgal.apps.view.drawing import Drawing, furnish
-from proxcgal.apps.view.gate import NOBODY, Bounds, close, serve
+from proxcgal.apps.view.gate import NOBODY, close, serve
+from proxcgal.apps.view.messages import Bounds
 from proxcgal.apps.view.stage import Stage
 from proxcgal.sim.moment import Moment
 

@@ -13,19 +13,16 @@ from __future__ import annotations
 import hmac
 import http
 import logging
-import math
 import socket
 import threading
 import time as clock
 import urllib.parse
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from unittest import mock
 
-import msgspec
 import viser
 import websockets.asyncio.server
 from websockets.asyncio.server import ServerConnection
@@ -34,6 +31,7 @@ from websockets.exceptions import ConnectionClosedError
 from websockets.frames import Close, CloseCode
 from websockets.http11 import Request, Response
 
+from proxcgal.apps.view.messages import Bounds, understood
 from proxcgal.errors import ConfigError
 
 _QUIET = logging.getLogger("proxcgal.page")
@@ -43,18 +41,6 @@ _QUIET.propagate = False
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
 #: Of a replay in a report's making: nobody may look.
 NOBODY = 0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Bounds:
-    """What a page may ask of us."""
-
-    viewers: int = 16  #: pages at once
-    message_bytes: int = 16_384
-    messages: float = 240.0  #: a second, of one page; a dragged handle and a turned camera send 100
-    burst: float = 480.0  #: messages that may come at once
-    longest_text: int = 200  #: characters of a value
-    farthest: float = 1000.0  #: of any number in a pose [m]
 
 
 class Gate:
@@ -106,36 +92,24 @@ class Gate:
         return f"{_cookie_name(request)}={self.token}; HttpOnly; SameSite=Strict; Path=/"
 
     @contextmanager
-    def viewer(self) -> Iterator[None]:
-        """Counts a connected page."""
+    def viewer(self) -> Iterator[bool]:
+        """Counts a connected page; false where others came first while it was let in."""
         with self._lock:
             self._viewers += 1
+            room = self._viewers <= self.bounds.viewers
         try:
-            yield
+            yield room
         finally:
             with self._lock:
                 self._viewers -= 1
 
     def accepts(self, raw: object) -> bool:
         """Is this a message that a page may send?"""
-        if not isinstance(raw, bytes) or len(raw) > self.bounds.message_bytes:
-            return False
-        try:
-            message = msgspec.msgpack.decode(raw)
-        except (msgspec.DecodeError, RecursionError, ValueError):
-            return False
-        if not isinstance(message, dict):
-            return False
-        kind = message.pop("type", None)
-        fields = _FIELDS.get(kind) if isinstance(kind, str) else None
-        if fields is None or not fields.keys() - _MAY_LACK <= message.keys() <= fields.keys():
-            return False
-        if not all(fields[name](value, self.bounds) for name, value in message.items()):
-            return False
-        if kind != "GuiUpdateMessage":
-            return True
-        allowed = self._controls.get(message["uuid"])
-        return allowed is not None and allowed(message["updates"]["value"])
+        message = understood(raw, self.bounds)
+        if message is None or message.kind != "GuiUpdateMessage":
+            return message is not None
+        allowed = self._controls.get(message.fields["uuid"])
+        return allowed is not None and allowed(message.fields["updates"]["value"])
 
     def _knows_token(self, request: Request) -> bool:
         if self.token is None:
@@ -183,8 +157,11 @@ def serve(
         files = options.pop("process_request")
 
         async def watched(connection: ServerConnection) -> None:
-            with gate.viewer():
-                await handler(connection)
+            with gate.viewer() as room:
+                if room:
+                    await handler(connection)
+                else:
+                    await connection.close(CloseCode.TRY_AGAIN_LATER, "too many pages")
 
         def answer(connection: ServerConnection, request: Request) -> Response | None:
             if (refusal := gate.admit(request)) is not None:
@@ -294,74 +271,3 @@ def _cookie_name(request: Request) -> str:
     except ValueError:
         port = 0
     return f"proxcgal_{port}"
-
-
-# --- What each kind of message may hold
-
-
-def _text(value: object, bounds: Bounds) -> bool:
-    return isinstance(value, str) and len(value) <= bounds.longest_text
-
-
-def switch(value: object) -> bool:
-    """What a checkbox or a button may be set to."""
-    return isinstance(value, bool)
-
-
-def one_of(options: Collection[str]) -> Callable[[object], bool]:
-    """What a list may be set to."""
-    return lambda value: isinstance(value, str) and value in options
-
-
-def between(low: float, high: float) -> Callable[[object], bool]:
-    """What a slider may be set to; NaN is not."""
-    return lambda value: (
-        isinstance(value, int | float) and not isinstance(value, bool)
-        and low - 1e-9 <= value <= high + 1e-9
-    )  # fmt: skip
-
-
-def _number(value: object, bounds: Bounds) -> bool:
-    return (
-        isinstance(value, int | float)
-        and not isinstance(value, bool)
-        and math.isfinite(value)
-        and abs(value) <= 1e6
-    )
-
-
-def _vector(length: int) -> Callable[[object, Bounds], bool]:
-    def check(value: object, bounds: Bounds) -> bool:
-        return (
-            isinstance(value, list)
-            and len(value) == length
-            and all(_number(each, bounds) and abs(each) <= bounds.farthest for each in value)
-        )
-
-    return check
-
-
-def _quaternion(value: object, bounds: Bounds) -> bool:
-    if not _vector(4)(value, bounds):
-        return False
-    assert isinstance(value, list)
-    return 0.9 < float(sum(each * each for each in value)) < 1.1
-
-
-def _updates(value: object, bounds: Bounds) -> bool:
-    """A control's value, and nothing else of it."""
-    return isinstance(value, dict) and value.keys() == {"value"}
-
-
-_POSE = {"wxyz": _quaternion, "position": _vector(3)}
-_FIELDS: Mapping[str, Mapping[str, Callable[[Any, Bounds], bool]]] = {
-    "ViewerCameraMessage": {
-        **_POSE, "fov": _number, "near": _number, "far": _number, "image_height": _number,
-        "image_width": _number, "look_at": _vector(3), "up_direction": _vector(3),
-    },
-    "GuiUpdateMessage": {"uuid": _text, "updates": _updates},
-    "TransformControlsUpdateMessage": {"name": _text, "owner": _text, **_POSE},
-    "TransformControlsDragStartMessage": {"name": _text, "owner": _text},
-    "TransformControlsDragEndMessage": {"name": _text, "owner": _text},
-}  # fmt: skip
-_MAY_LACK = {"owner"}

@@ -10,7 +10,8 @@ import numpy as np
 import viser
 
 from proxcgal.apps.view.drawing import Drawing, furnish
-from proxcgal.apps.view.gate import Gate, between, one_of, switch
+from proxcgal.apps.view.gate import Gate
+from proxcgal.apps.view.messages import between, one_of, switch
 from proxcgal.apps.view.plots import whole_run
 from proxcgal.apps.view.replayed import AHEAD, Replayed
 from proxcgal.sim.moment import MODES, Moment

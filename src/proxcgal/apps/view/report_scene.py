@@ -10,6 +10,7 @@ import numpy as np
 
 from proxcgal.apps.view.export import Played, exported
 from proxcgal.apps.view.replayed import Replayed, replayed
+from proxcgal.apps.view.stage import Stage
 from proxcgal.errors import ConfigError
 from proxcgal.sim.live import LiveTrial
 from proxcgal.sim.recording import read_recording
@@ -51,8 +52,6 @@ def still_scene(name: str) -> bytes:
     trial = LiveTrial(load_scenario(name), "wb")
     for _ in range(round(_SEEN_AFTER / trial.period)):
         trial.step()
-    from proxcgal.apps.view.stage import Stage
-
     return exported(Played(Stage.of(trial.setup), [trial.moment()]))
 
 
