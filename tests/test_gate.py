@@ -229,7 +229,7 @@ def test_more_pages_than_allowed_are_told_so_and_one_that_leaves_makes_room() ->
             first.close()
             assert until(lambda: served.gate.viewers == 1)
             with served.connect():
-                assert served.gate.viewers == 2
+                assert until(lambda: served.gate.viewers == 2)
     finally:
         close(served.server)
 
