@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from proxcgal.sim.limbs import arms
 from proxcgal.sim.scene import Scene
 from proxcgal.sim.solids import Solid
 
@@ -64,7 +65,10 @@ class Hands:
 
 
 class LiveScene:
-    """A scene some of whose solids are held; the others go their own way."""
+    """A scene some of whose solids are held; the others go their own way.
+
+    A person's hand takes the arm along.
+    """
 
     still = False
 
@@ -73,6 +77,7 @@ class LiveScene:
         self._scene = scene
         self._hands = hands
         self._since = since
+        self._arms = arms(scene.names, scene.solids)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -89,6 +94,9 @@ class LiveScene:
         poses = np.array(self._scene.poses(self._since + time))
         for name, pose in self._held():
             poses[self.names.index(name)] = pose
+        for arm in self._arms:
+            if arm.hand_name in self._hands.held:
+                arm.follow(poses)
         return poses
 
     def twists(self, time: float) -> Array:

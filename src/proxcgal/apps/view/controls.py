@@ -254,11 +254,9 @@ class Controls:
 
 def _first(stage: Stage, names: Sequence[str]) -> str:
     """What the handle begins at: a hand where there is one, else what is nearest to the tool."""
-    hands = [name for name in names if "hand" in name]
-    if hands:
-        return hands[0]
+    hands = [name for name in names if "hand" in name] or names
     far = np.linalg.norm(stage.solids_W[:, :3, 3] - stage.tool_W, axis=1)
-    return stage.names[int(far.argmin())]
+    return min(hands, key=lambda name: float(far[stage.names.index(name)]))
 
 
 def _count(vertices: int) -> str:

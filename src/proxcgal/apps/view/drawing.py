@@ -205,8 +205,18 @@ def furnish(server: viser.ViserServer, stage: Stage) -> None:
     scene.add_grid(
         "/floor", width=4.0, height=4.0, plane="xy", cell_size=0.25, section_size=1.0,
         cell_color=(226, 229, 233), section_color=(190, 196, 204),
+        position=(0.0, 0.0, floor(stage)),
     )  # fmt: skip
     look(server, stage)
+
+
+def floor(stage: Stage) -> float:
+    """Where somebody stands, or what stands lower than the arm's base; else that base [m]."""
+    lowest = (
+        float(T_WO[2, 3] - np.abs(T_WO[2, :3]) @ solid.extent)
+        for T_WO, solid in zip(stage.solids_W, stage.solids, strict=True)
+    )
+    return min(0.0, *lowest, 0.0)
 
 
 def look(server: viser.ViserServer, stage: Stage) -> None:
