@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 import proxcgal as px
 from proxcgal.apps.view.choice import Choice, robots
 from proxcgal.apps.view.desk import ROOM, Desk
+from proxcgal.apps.view.preparation import Preparation
 from proxcgal.apps.view.simulation import Told, Wishes, simulate
 from proxcgal.models.display import display_meshes
 from proxcgal.sim.frames import pose
@@ -171,6 +172,23 @@ def test_another_choice_goes_on_where_the_arm_is(front: Scenario) -> None:
     assert stage.stage.d_min == 0.3
     assert np.abs(after.q - before.q).max() < 0.5
     assert after.elapsed > before.elapsed
+
+
+def test_meshes_are_prepared_beside_the_simulation_and_then_chosen(cell: Scenario) -> None:
+    own = Choice.of(cell, "wb")
+    preparation = Preparation(cell)
+    assert preparation.asked(replace(own, d_min=0.3)) == replace(own, d_min=0.3)
+    coarse = replace(own, vertices=100)
+    assert preparation.asked(replace(own, vertices=300)) is None
+    assert preparation.asked(coarse) is None  # in place of the other
+    end = clock.monotonic() + 60.0
+    while (ready := preparation.done()) is None and clock.monotonic() < end:
+        assert preparation.busy
+        clock.sleep(0.05)
+    assert ready == coarse
+    assert preparation.asked(coarse) == coarse
+    preparation.close()
+    assert multiprocessing.active_children() == []
 
 
 def test_every_robot_with_sensors_can_stand_in_a_scene(front: Scenario) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import threading
 import time as clock
+from dataclasses import replace
 from multiprocessing.connection import Connection
 
 import viser
@@ -13,6 +14,7 @@ from proxcgal.apps.view.controls import Controls
 from proxcgal.apps.view.desk import Desk
 from proxcgal.apps.view.drawing import Drawing, furnish
 from proxcgal.apps.view.gate import Gate
+from proxcgal.apps.view.preparation import Preparation
 from proxcgal.apps.view.simulation import FRAME_HZ, Told, simulate
 from proxcgal.errors import SimulationError
 from proxcgal.sim.scenario import Scenario
@@ -51,7 +53,8 @@ class LivePage:
         self._shown: tuple[object, ...] = ()
         self._note, self._noted = "", 0.0
         self._plotted = 0.0
-        self._waiting = True  # for a stage: it takes no wishes meanwhile
+        self._waiting = True  # for the first stage: it takes no wishes before
+        self._preparation = Preparation(scenario)
         self._closing = threading.Event()
         self.failure: str | None = None  #: why the simulation ended, where it did by itself
         context = multiprocessing.get_context("spawn")
@@ -79,6 +82,7 @@ class LivePage:
         """Ends the simulation."""
         self._closing.set()
         self._thread.join(timeout=2.0)
+        self._preparation.close()
         self._link.close()
         self._process.join(timeout=2.0)
         if self._process.is_alive():
@@ -103,9 +107,13 @@ class LivePage:
             now = clock.monotonic()
             if not self._waiting and now >= spoken + 1.0 / WORD_HZ:
                 spoken = now
+                if (choice := self._preparation.done()) is not None:
+                    self.desk.want(choice=choice)
                 if (wishes := self.desk.take()) is not None:
-                    # Setting up takes seconds; wishes of that time are collected here meanwhile.
-                    self._waiting = wishes.choice is not None
+                    if wishes.choice is not None:
+                        wishes = replace(wishes, choice=self._preparation.asked(wishes.choice))
+                        if self._preparation.busy:
+                            self._tell("preparing meshes ...")
                     link.send(wishes)
                     if wishes.reset or wishes.anew or wishes.release:
                         self._controls.free()
@@ -115,9 +123,7 @@ class LivePage:
             self.failure = told.failed
             self._controls.status(Told(), f"the simulation has ended: {told.failed}")
         if told.note:
-            self._note, self._noted = told.note, clock.monotonic()
-            self._waiting = self._waiting and told.note.startswith("preparing")
-            self._controls.status(self.told, self._note)
+            self._tell(told.note)
         if told.stage is not None and told.choice is not None:
             self._waiting = False
             self._note = ""
@@ -133,6 +139,10 @@ class LivePage:
         if told.moment is not None and self._drawing is not None:
             self.told = told
             self._draw(told, self._drawing)
+
+    def _tell(self, note: str) -> None:
+        self._note, self._noted = note, clock.monotonic()
+        self._controls.status(self.told, note)
 
     def _draw(self, told: Told, drawing: Drawing) -> None:
         assert told.moment is not None
@@ -150,6 +160,7 @@ class LivePage:
         now = clock.monotonic()
         if now >= self._plotted + 1.0 / PLOT_HZ:
             self._plotted = now
-            note = self._note if now < self._noted + _NOTED else ""
+            kept = self._preparation.busy or now < self._noted + _NOTED
+            note = self._note if kept else ""
             self._controls.status(told, note)
             self._controls.plots.show(*self._bounds)

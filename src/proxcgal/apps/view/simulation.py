@@ -197,7 +197,6 @@ class _Simulation:
         elif wishes.reset or (wishes.choice is not None and stopped):
             self._note("the controller has stopped: only a reset where `proxcgal view` runs helps")
         if wishes.choice is not None and not stopped and wishes.choice != self._choice:
-            self._note("preparing ...")
             try:
                 self._anew(wishes.choice, keep=wishes.choice.robot == self._choice.robot)
                 self._choice = wishes.choice
