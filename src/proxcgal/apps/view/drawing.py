@@ -29,6 +29,7 @@ SOLID: Color = (250, 186, 92)
 SENSOR: Color = (250, 204, 40)
 SILENT: Color = (120, 120, 120)
 _VIEW: Color = (214, 176, 60)
+_WALL = 1.0  # [m] half an edge from which a solid is a wall, which hides nothing
 _FRUSTUM = 0.10  # [m] of a field of view that is drawn, along its axis
 _SHAFT: dict[str, Any] = {"shaft_radius": 0.008, "head_radius": 0.02, "head_length": 0.05}
 _NOTHING = np.zeros((1, 3), np.float32)  # clouds and arrows are never empty: they are hidden
@@ -241,8 +242,11 @@ def viewpoint(stage: Stage) -> tuple[Array, Array]:
 
 def _solid(scene: viser.SceneApi, name: str, solid: Solid) -> Any:
     plain: dict[str, Any] = {
-        "color": SOLID, "opacity": 0.45, "cast_shadow": False, "receive_shadow": False
-    }  # fmt: skip
+        "color": SOLID,
+        "opacity": 0.45 if solid.extent.max() < _WALL else 0.06,
+        "cast_shadow": False,
+        "receive_shadow": False,
+    }
     if isinstance(solid, Box):
         return scene.add_box(name, dimensions=tuple(solid.size), **plain)  # type: ignore[arg-type]
     if isinstance(solid, Cylinder):
