@@ -117,6 +117,18 @@ def test_a_sensor_that_is_switched_off_leaves_the_cloud(live: Live) -> None:
     live.tab.picture("silent", live.folder)
 
 
+def test_a_slider_changes_the_law_and_the_arm_goes_on_where_it_is(live: Live) -> None:
+    q = live.moment.q
+    slider = live.tab.page.get_by_role("slider").first
+    slider.focus()
+    slider.press("ArrowRight")
+    slider.press("ArrowRight")
+    wanted = live.scenario.controller.d_min + 0.02
+    assert until(lambda: live.page.bounds[0] == pytest.approx(wanted))
+    live.passed(0.1)
+    assert np.abs(live.moment.q - q).max() < 0.3
+
+
 def test_reset_and_pause_are_heard(live: Live) -> None:
     live.press("pause")
     assert until(lambda: not live.page.told.running)

@@ -174,6 +174,27 @@ def test_another_choice_goes_on_where_the_arm_is(front: Scenario) -> None:
     assert after.elapsed > before.elapsed
 
 
+def test_another_robot_starts_with_its_own_sensors(front: Scenario) -> None:
+    with started(front) as link:
+        listen(link, lambda told: told.moment)
+        link.send(Wishes(choice=replace(Choice.of(front, "wb"), robot="panda")))
+        stage = listen(link, lambda told: told.stage).stage
+        moment = listen(link, lambda told: told.moment and len(told.moment.q) == 7).moment
+    assert (stage.robot, len(stage.sensors)) == ("panda", 30)
+    assert len(moment.links_W) == len(stage.links)
+
+
+def test_a_choice_that_does_not_fit_is_refused_and_the_run_goes_on(front: Scenario) -> None:
+    with started(front) as link:
+        listen(link, lambda told: told.moment)
+        link.send(Wishes(choice=replace(Choice.of(front, "wb"), d_min=9.0)))
+        note = listen(link, lambda told: told.note)
+        assert "d_min = 9: from 0.05 to 0.5" in note.note
+        back = listen(link, lambda told: told.refused)
+        assert back.choice == Choice.of(front, "wb")
+        listen(link, lambda told: told.moment)
+
+
 def test_meshes_are_prepared_beside_the_simulation_and_then_chosen(cell: Scenario) -> None:
     own = Choice.of(cell, "wb")
     preparation = Preparation(cell)

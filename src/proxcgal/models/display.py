@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from weakref import WeakKeyDictionary
+
 import numpy as np
 
 from proxcgal.models.resolution import COUNT_TOLERANCE, control_mesh
@@ -23,7 +25,13 @@ def display_meshes(robot: Robot, vertices: int = DISPLAY_VERTICES) -> list[tuple
         robot: its links, in the order of link_names.
         vertices: of a link, at most.
     """
-    return [_light(*robot.full_mesh(link), vertices) for link in robot.link_names]
+    made = _made.setdefault(robot, {})
+    if vertices not in made:
+        made[vertices] = [_light(*robot.full_mesh(link), vertices) for link in robot.link_names]
+    return made[vertices]
+
+
+_made: WeakKeyDictionary[Robot, dict[int, list[tuple[Floats, Ints]]]] = WeakKeyDictionary()
 
 
 def _light(vertices_L: Floats, triangles: Ints, count: int) -> tuple[Floats, Ints]:

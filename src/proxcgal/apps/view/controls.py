@@ -54,7 +54,6 @@ class Controls:
         self._sensors: list[Any] = []
         self._of_stage: list[Any] = []
         self._held = False
-        self._telling = False  # while our own word is written into the controls
         gui = server.gui
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
         gui.main_panel.dock_right()
@@ -95,17 +94,16 @@ class Controls:
         """Fields of view, filtered cloud, removed points: are they to be seen?"""
         return self._views.value, self._kept.value, self._removed.value
 
-    def stage(self, stage: Stage, choice: Choice) -> None:
-        """Another stage, or other settings: the controls show them."""
-        self._choice = choice
-        self._telling = True
-        self._lists["controller"].value = choice.controller
-        self._lists["robot"].value = choice.robot
-        self._lists["vertices"].value = _count(choice.vertices)
-        self._noise.value = choice.noise
-        for name, slider in self._sliders.items():
-            slider.value = getattr(choice, name)
-        self._telling = False
+    def stage(self, stage: Stage, back: Choice | None) -> None:
+        """Another stage; `back` is shown where what was wanted could not be."""
+        if back is not None:
+            self._choice = back  # first: what the controls tell then is nothing new
+            self._lists["controller"].value = back.controller
+            self._lists["robot"].value = back.robot
+            self._lists["vertices"].value = _count(back.vertices)
+            self._noise.value = back.noise
+            for name, slider in self._sliders.items():
+                slider.value = getattr(back, name)
         if self._stage is None or self._stage.key != stage.key:
             self._renew(stage)
         self._stage = stage
@@ -195,9 +193,10 @@ class Controls:
         self._desk.want(release=True)
 
     def _choose(self, **changes: Any) -> None:
-        if not self._telling:
-            self._choice = replace(self._choice, **changes)
-            self._desk.want(choice=self._choice)
+        changed = replace(self._choice, **changes)
+        if changed != self._choice:
+            self._choice = changed
+            self._desk.want(choice=changed)
 
     def _hook_choices(self) -> None:
         read: dict[str, Callable[[Any], Any]] = {

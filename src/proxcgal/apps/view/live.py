@@ -47,6 +47,7 @@ class LivePage:
         self.desk = Desk()
         self.told = Told()  #: the last moment that was drawn
         self.drawn = 0  #: moments so far
+        self.bounds = (0.0, 0.0)  #: d_min and buffer of the law [m]
         self._server = server
         self._controls = Controls(server, gate, self.desk, scenario, controller)
         self._drawing: Drawing | None = None
@@ -134,8 +135,8 @@ class LivePage:
                     self._drawing.remove()
                 self._drawing = Drawing(self._server.scene, told.stage)
                 self._shown = ()
-            self._bounds = told.stage.d_min, told.stage.buffer
-            self._controls.stage(told.stage, told.choice)
+            self.bounds = told.stage.d_min, told.stage.buffer
+            self._controls.stage(told.stage, told.choice if told.refused else None)
         if told.moment is not None and self._drawing is not None:
             self.told = told
             self._draw(told, self._drawing)
@@ -163,4 +164,4 @@ class LivePage:
             kept = self._preparation.busy or now < self._noted + _NOTED
             note = self._note if kept else ""
             self._controls.status(told, note)
-            self._controls.plots.show(*self._bounds)
+            self._controls.plots.show(*self.bounds)

@@ -53,6 +53,7 @@ class Told:
     moment: Moment | None = None
     stage: Stage | None = None  #: where it is another one
     choice: Choice | None = None  #: with the stage: what it was made with
+    refused: bool = False  #: with the choice: another one was wanted, and could not be
     note: str = ""  #: what could not be done, or is being done
     late_us: tuple[float, float] = (0.0, 0.0)  #: of the last ticks' wake-ups: median and p99
     cpu_us: float = 0.0  #: median thread CPU of the last ticks
@@ -203,7 +204,7 @@ class _Simulation:
                 self._stage()
             except ProxError as error:
                 self._note(str(error))
-                self._stage()
+                self._stage(refused=True)
         if wishes.running is not None:
             self._running = wishes.running
         if wishes.release:
@@ -250,9 +251,11 @@ class _Simulation:
             )
         )  # fmt: skip
 
-    def _stage(self) -> None:
+    def _stage(self, *, refused: bool = False) -> None:
         stage = Stage.of(self._trial.setup)
-        self._outbox.tell(Told(stage=stage, choice=self._choice, running=self._running))
+        self._outbox.tell(
+            Told(stage=stage, choice=self._choice, running=self._running, refused=refused)
+        )
 
     def _note(self, text: str) -> None:
         self._outbox.tell(Told(note=text, running=self._running))
