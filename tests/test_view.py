@@ -160,13 +160,20 @@ def test_pause_step_and_reset(cell: Scenario) -> None:
         assert np.array_equal(again.moment.q, cell.q0)
 
 
-def test_another_choice_goes_on_where_the_arm_is(front: Scenario) -> None:
+def test_another_choice_goes_on_where_the_arm_is_and_one_that_does_not_fit_changes_nothing(
+    front: Scenario,
+) -> None:
     with started(front) as link:
         before = listen(link, lambda told: told.moment and told.moment.elapsed > 0.5).moment
         choice = replace(Choice.of(front, "wb"), d_min=0.3, controller="sm")
         link.send(Wishes(choice=choice))
         stage = listen(link, lambda told: told.stage)
         after = listen(link, lambda told: told.moment).moment
+        link.send(Wishes(choice=replace(choice, d_min=9.0)))
+        note = listen(link, lambda told: told.note).note
+        back = listen(link, lambda told: told.refused)
+    assert "d_min = 9: from 0.05 to 0.5" in note
+    assert back.choice == choice
     assert stage.choice == choice
     assert stage.stage is not None
     assert stage.stage.d_min == 0.3
@@ -174,6 +181,7 @@ def test_another_choice_goes_on_where_the_arm_is(front: Scenario) -> None:
     assert after.elapsed > before.elapsed
 
 
+@pytest.mark.long
 def test_another_robot_starts_with_its_own_sensors(front: Scenario) -> None:
     with started(front) as link:
         listen(link, lambda told: told.moment)
@@ -182,17 +190,6 @@ def test_another_robot_starts_with_its_own_sensors(front: Scenario) -> None:
         moment = listen(link, lambda told: told.moment and len(told.moment.q) == 7).moment
     assert (stage.robot, len(stage.sensors)) == ("panda", 30)
     assert len(moment.links_W) == len(stage.links)
-
-
-def test_a_choice_that_does_not_fit_is_refused_and_the_run_goes_on(front: Scenario) -> None:
-    with started(front) as link:
-        listen(link, lambda told: told.moment)
-        link.send(Wishes(choice=replace(Choice.of(front, "wb"), d_min=9.0)))
-        note = listen(link, lambda told: told.note)
-        assert "d_min = 9: from 0.05 to 0.5" in note.note
-        back = listen(link, lambda told: told.refused)
-        assert back.choice == Choice.of(front, "wb")
-        listen(link, lambda told: told.moment)
 
 
 def test_meshes_are_prepared_beside_the_simulation_and_then_chosen(cell: Scenario) -> None:
