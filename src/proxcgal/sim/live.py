@@ -16,6 +16,7 @@ from proxcgal.sim.faults import FaultInjector
 from proxcgal.sim.hands import Hands, LiveScene
 from proxcgal.sim.loop import run_ticks
 from proxcgal.sim.moment import Moment
+from proxcgal.sim.mounting import require_mounts
 from proxcgal.sim.scenario import Scenario
 from proxcgal.sim.setup import Setup
 from proxcgal.sim.source import SimulatedSource
@@ -53,7 +54,7 @@ class LiveTrial:
             since: of the scene, at the first tick [s].
 
         Raises:
-            ConfigError: what of the scenario does not fit.
+            ConfigError: what of the scenario does not fit; sensors that do not sit where it says.
         """
         setup = Setup.of(scenario, robot)
         self.hands = hands or Hands()
@@ -72,7 +73,9 @@ class LiveTrial:
         names = [mount.name for mount in setup.skin.mounts]
         self._faults = FaultInjector(scenario.faults, names, scenario.seed)
         world = World(setup.robot, scene) if known is None else None
-        source = SimulatedSource(setup, world, scenario.seed)
+        self._source = source = SimulatedSource(setup, world, scenario.seed)
+        if world is not None and scenario.skin.check_mounts and q is None:
+            require_mounts(setup, source)
         self._truth = Truth(setup.robot, scene)
         self._count = 0
         self._ticks = run_ticks(source, self.law, self._spoiled, known)
@@ -122,7 +125,7 @@ class LiveTrial:
         assert self._last is not None, "step() comes first"
         given, result = self._last
         now = (self._count - 1) * self.period
-        true = self._truth(given.q, now).distance
+        true = self._truth(self._source.q, now).distance
         return Moment.of(
             self.setup, given, result, self.law, now, true=true, since=self.since, off=self.off
         )
