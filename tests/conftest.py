@@ -6,9 +6,8 @@ from typing import NamedTuple
 
 import pytest
 
-from browser import Tab, chromium
-
 import proxcgal as px
+from browser import Tab, chromium
 from proxcgal.apps import cli
 from proxcgal.study import static
 from proxcgal.study.campaign import Campaign
