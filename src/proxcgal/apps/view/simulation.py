@@ -71,10 +71,12 @@ def simulate(link: Connection, scenario: Scenario, controller: str, hz: float = 
     except (EOFError, BrokenPipeError, ConnectionResetError, KeyboardInterrupt):
         pass
     except ProxError as error:
-        outbox.last(Told(failed=str(error)))
+        outbox.tell(Told(failed=str(error)))
     except Exception as error:  # the page is to say so, not to stand still
-        outbox.last(Told(failed=f"{type(error).__name__}: {error}"))
+        outbox.tell(Told(failed=f"{type(error).__name__}: {error}"))
         raise
+    finally:
+        outbox.close()
 
 
 class _Outbox:
@@ -111,9 +113,8 @@ class _Outbox:
             self._free = True
             self._wake.notify()
 
-    def last(self, told: Told) -> None:
-        """Sent, and nothing after it."""
-        self.tell(told)
+    def close(self) -> None:
+        """What was told is sent, nothing after it, and the thread ends."""
         with self._wake:
             self._closed = True
             self._wake.notify()
