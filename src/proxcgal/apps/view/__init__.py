@@ -36,7 +36,7 @@ class ViewOptions:
 
     scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO")]
     """A name that `proxcgal scenarios` lists, or a path to a TOML file."""
-    controller: Annotated[ControllerName, tyro.conf.arg(metavar="wb|sm|wb_known")] = "wb"
+    controller: Annotated[ControllerName, tyro.conf.arg(metavar="wb|sm|wb_known|wb_memory")] = "wb"
     """The law that begins; the page can change it."""
     set: Settings = ()
     """Change keys of the scenario, values as in TOML: controller.d_min=0.25"""
