@@ -1,12 +1,13 @@
 """What every test may use: markers and the options behind them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 
 import proxcgal as px
+from browser import Tab, chromium
 from proxcgal.apps import cli
 from proxcgal.study import static
 from proxcgal.study.campaign import Campaign
@@ -104,6 +105,13 @@ def arm_cell(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "arm.urdf").write_text(_ARM)
     (folder / "cell.toml").write_text(_CELL)
     return folder / "cell.toml"
+
+
+@pytest.fixture(scope="session")
+def open_tab() -> Iterator[Callable[[], Tab]]:
+    """Opens a tab of a real browser; skipped where there is none."""
+    with chromium() as opened:
+        yield opened
 
 
 _LEFT_OUT = pytest.StashKey[int]()

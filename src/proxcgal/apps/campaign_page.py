@@ -10,7 +10,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from proxcgal.apps.campaign import KINDS
-from proxcgal.apps.document import PICTURE_BYTES, document, origin_part, picture
+from proxcgal.apps.document import (
+    PICTURE_BYTES,
+    REPLAY_BYTES,
+    document,
+    origin_part,
+    picture,
+)
+from proxcgal.apps.kept import FOLDER
+from proxcgal.apps.replays import Replays
 from proxcgal.apps.stored import StoredCampaign
 from proxcgal.errors import ConfigError
 
@@ -42,13 +50,16 @@ def _parts(kind: Kind, stored: StoredCampaign) -> Iterator[str]:
         yield f"<p>{escape(sentence)}</p>"
     for listing in kind.listings(summary):
         yield from _listing(listing)
-    budget = PICTURE_BYTES
+    replays = Replays(REPLAY_BYTES)
+    worst = _replay_of_worst(stored, replays)
+    budget = PICTURE_BYTES - replays.used
     for name, caption in kind.captions(summary).items():
         part, used = picture(stored.folder / Path(name).name, caption, budget)
         budget -= used
         yield part
-    yield from _commands(stored)
+    yield from _commands(stored, worst)
     yield from origin_part(stored.about)
+    yield from replays.parts()
 
 
 def _listing(listing: Listing) -> Iterator[str]:
@@ -67,10 +78,21 @@ def _listing(listing: Listing) -> Iterator[str]:
     yield "</tbody></table></div>"
 
 
-def _commands(stored: StoredCampaign) -> Iterator[str]:
+def _replay_of_worst(stored: StoredCampaign, replays: Replays) -> str:
+    """The first of the worst that was recorded, in 3D."""
+    for entry in stored.summary["worst"]:
+        # A summary's words must not lead out of the folder.
+        file = stored.folder / FOLDER / Path(str(entry.get("recording", ""))).name
+        if file.is_file():
+            return replays.of_runs(stored.folder, [file])
+    return ""
+
+
+def _commands(stored: StoredCampaign, replay: str) -> Iterator[str]:
     """What steps through the worst trials, and what runs them and the failed ones again."""
     if stored.summary["worst"]:
         yield "<h2>The worst</h2>"
+        yield replay
     for entry in stored.summary["worst"]:
         if "error" in entry:
             reason = f"{entry['name']}: not recorded: {entry['error']}"

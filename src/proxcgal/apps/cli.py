@@ -24,6 +24,7 @@ usage: proxcgal COMMAND ...
   campaign KIND  many trials, on this machine or on a cluster, and what they amount to
   coverage SCENARIO   what the sensors see of the space round the arm
   sweep          time both algorithms, literal and accelerated, over meshes and clouds
+  view SCENARIO  a scene in the browser, live: drag the obstacle
   replay FILE    step through a recording
   report DIR     write DIR/report.html from the results in DIR
   scenarios      the scenes there are
@@ -37,6 +38,7 @@ examples:
   proxcgal run side_plane --controller wb sm --seed 3 --out out/side
   proxcgal run front_plane --set controller.d_min=0.25 simulation.dropout=0.1
   proxcgal run front_plane --robot my_arm.urdf --package-dir ~/robots
+  proxcgal view front_plane
   proxcgal replay out/side/wb.mcap --every 50
   proxcgal sweep --quick
 """
@@ -48,6 +50,7 @@ COMMANDS = {
     "campaign": "proxcgal.apps.campaign",
     "coverage": "proxcgal.apps.coverage",
     "sweep": "proxcgal.apps.sweep",
+    "view": "proxcgal.apps.view",
     "replay": "proxcgal.apps.replay",
     "report": "proxcgal.apps.report",
     "scenarios": "proxcgal.apps.lists",

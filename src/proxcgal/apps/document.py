@@ -11,20 +11,33 @@ from pathlib import Path
 from proxcgal.apps.stored import About
 
 MAX_BYTES = 10_000_000  # of the whole page
+REPLAY_BYTES = 6_000_000  # of that, at most, for what plays in 3D
 PICTURE_BYTES = MAX_BYTES - 400_000  # of all its pictures; the rest is text
+
+
+#: What the page may load: what lies inside of it. No script, unless something plays.
+_CLOSED = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
+_PLAYS = (
+    "default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; font-src data:; "
+    "script-src 'unsafe-inline' 'unsafe-eval' blob: data:; worker-src blob: data:; "  # its wasm
+    "connect-src blob: data:; frame-src 'self' blob: data:"
+)
 
 
 def document(title: str, parts: Iterable[str]) -> str:
     """A valid HTML page of these parts under that title, its style inside."""
+    body = list(parts)
+    policy = _PLAYS if any(part.startswith("<script") for part in body) else _CLOSED
     css = resources.files("proxcgal.apps").joinpath("report.css").read_text()
     head = (
         "<!DOCTYPE html>",
         '<html lang="en"><head><meta charset="utf-8">',
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}">',
         f"<title>{escape(title)}</title><style>{css}</style></head><body>",
         f"<h1>{escape(title)}</h1>",
     )
-    return "\n".join([*head, *parts, "</body></html>"]) + "\n"
+    return "\n".join([*head, *body, "</body></html>"]) + "\n"
 
 
 def picture(path: Path, caption: str, budget: int) -> tuple[str, int]:

@@ -5,7 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from html import escape
 
-from proxcgal.apps.document import PICTURE_BYTES, document, origin_part, picture
+from proxcgal.apps.document import (
+    PICTURE_BYTES,
+    REPLAY_BYTES,
+    document,
+    origin_part,
+    picture,
+)
+from proxcgal.apps.replays import Replays
 from proxcgal.apps.stored import About, Numbers, Run
 from proxcgal.study.analysis import SELF_LIMIT_M, shown
 
@@ -58,8 +65,10 @@ def _parts(runs: Sequence[Run], about: About) -> Iterator[str]:
     yield from _introduction(runs)
     yield from _table(runs)
     yield from _verdict(runs)
-    budget = PICTURE_BYTES
-    for run in runs:
+    replays = Replays(REPLAY_BYTES)
+    played = [replays.of_runs(run.folder) for run in runs]
+    budget = PICTURE_BYTES - replays.used
+    for run, replay in zip(runs, played, strict=True):
         yield f"<h2>{escape(run.summary.scenario)}</h2>"
         if run.about.description:
             yield f"<p>{escape(_sentence(run.about.description))}</p>"
@@ -67,6 +76,7 @@ def _parts(runs: Sequence[Run], about: About) -> Iterator[str]:
             part, used = picture(run.folder / name, caption, budget)
             budget -= used
             yield part
+        yield replay
         yield from _trials(run)
         yield from _recordings(run)
     yield from origin_part(about)
@@ -76,6 +86,7 @@ def _parts(runs: Sequence[Run], about: About) -> Iterator[str]:
             yield f'<p class="soft">The resolved scenario ({escape("scenario.toml")}); '
             yield "<code>proxcgal run</code> takes this file as it is.</p>"
             yield f"<pre>{escape(run.settings)}</pre>"
+    yield from replays.parts()
 
 
 def _introduction(runs: Sequence[Run]) -> Iterator[str]:

@@ -24,7 +24,7 @@ MODES = ("RUN", "DEGRADED", "HOLD", "STOP")
 
 @dataclass(frozen=True)
 class ReplayOptions:
-    """Step through a recording: a line per tick, then what it amounts to.
+    """Step through a recording: a line per tick, then what it amounts to; or a page to scrub.
 
     With --controller or --set, the commands are computed again from the recorded inputs, and
     compared with those of the recording; unchanged settings give the same, bit for bit.
@@ -34,6 +34,7 @@ class ReplayOptions:
       proxcgal replay out/demo/front_plane/wb.mcap --at 3.2
       proxcgal replay out/demo/front_plane/wb.mcap --step
       proxcgal replay out/demo/front_plane/wb.mcap --set controller.d_min=0.3
+      proxcgal replay out/demo/front_plane/wb.mcap --controller sm --view
     """
 
     file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
@@ -51,6 +52,14 @@ class ReplayOptions:
     """Compute the commands of this controller from the recorded inputs."""
     set: Settings = ()
     """Compute the commands with other keys of the recorded scenario."""
+    view: Flag = False
+    """Open a page with a time line instead; with --controller or --set it shows both."""
+    host: Annotated[str, tyro.conf.arg(metavar="A")] = "127.0.0.1"
+    """Address that the page listens on."""
+    port: Annotated[int, tyro.conf.arg(metavar="N")] = 8080
+    """Port that the page listens on; 0 takes any that is free."""
+    token: Annotated[str | None, tyro.conf.arg(metavar="T", help_behavior_hint="")] = None
+    """What the page must be shown; left out: none on this machine, a random one beyond it."""
 
 
 def replay_command(options: ReplayOptions, command: str) -> int:
@@ -66,6 +75,8 @@ def replay_command(options: ReplayOptions, command: str) -> int:
     if not recording.ticks:
         raise ConfigError(f"{options.file}: holds no tick")
     changes = flat(options.set)
+    if options.view:
+        return _view(options, recording, changes)
     again = options.controller is not None or bool(changes)
     row = None if options.at is None else _row_at(recording, options.at)
     shown = _recomputed(recording, options.controller, changes) if again else recording
@@ -78,6 +89,35 @@ def replay_command(options: ReplayOptions, command: str) -> int:
     _print_summary(log)
     if again:
         _compare(recording, log)
+    return 0
+
+
+def _view(options: ReplayOptions, recording: Recording, changes: Sequence[str]) -> int:
+    """Serves the page until interrupted; prints its address."""
+    import threading
+
+    from proxcgal.apps.view import address, checked_token
+    from proxcgal.apps.view.gate import close, serve
+    from proxcgal.apps.view.replay_page import HZ, ReplayPage, said
+    from proxcgal.apps.view.replayed import replayed
+
+    token = checked_token(options.host, options.port, options.token)
+    recorded = replayed(recording, HZ)
+    again = None
+    if options.controller is not None or changes:
+        again = replayed(recording, HZ, options.controller, changes, ahead=True)
+    words = said(recorded, again)
+    server, gate = serve(
+        options.host, options.port, label=f"proxcgal: {options.file.name}", token=token
+    )
+    page = ReplayPage(server, gate, recorded, again, words)
+    try:
+        print(words)
+        print(address(options.host, server.get_port(), token), flush=True)
+        threading.Event().wait()
+    finally:
+        page.close()
+        close(server)
     return 0
 
 

@@ -5,7 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from html import escape
 
-from proxcgal.apps.document import PICTURE_BYTES, document, origin_part, picture
+from proxcgal.apps.document import (
+    PICTURE_BYTES,
+    REPLAY_BYTES,
+    document,
+    origin_part,
+    picture,
+)
+from proxcgal.apps.replays import Replays
 from proxcgal.apps.stored import Exponent, StoredCell, Sweep
 from proxcgal.study.sweep_ratios import CYCLE_US, compare, cycle_verdict
 
@@ -42,13 +49,16 @@ def _parts(sweep: Sweep) -> Iterator[str]:
         "sensed, Algorithm 2 what the filter leaves of it.</p>"
     )
     yield f"<p>{escape(cycle_verdict(compare(cell.model_dump() for cell in cells)))}</p>"
-    budget = PICTURE_BYTES
+    replays = Replays(REPLAY_BYTES)
+    scenes = [replays.of_scene(f"timing_{robot}") for robot in robots]
+    budget = PICTURE_BYTES - replays.used
     files = [*PICTURES, *((f"clouds_{robot}.png", CLOUDS) for robot in robots)]
     for name, caption in files:
         # A robot's name is a file's content here: it must not lead out of the folder.
         part, used = picture(sweep.folder / name.replace("/", "_"), caption, budget)
         budget -= used
         yield part
+    yield from scenes
     yield "<h2>Times</h2>"
     yield from _times(cells)
     if sweep.summary.growth:
@@ -60,6 +70,7 @@ def _parts(sweep: Sweep) -> Iterator[str]:
         "machine's, ratios carry further.</p>"
     )
     yield from origin_part(sweep.about)
+    yield from replays.parts()
 
 
 def _times(cells: Sequence[StoredCell]) -> Iterator[str]:

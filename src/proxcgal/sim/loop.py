@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import count
 
 import numpy as np
 
 from proxcgal import _core
-from proxcgal.sim.faults import FaultInjector
 from proxcgal.sim.scene import Cloud, FixedCloud
 from proxcgal.sim.source import Source
 from proxcgal.sim.ticks import TickInput, TickResult
@@ -18,7 +17,7 @@ from proxcgal.sim.ticks import TickInput, TickResult
 def run_ticks(
     source: Source,
     law: _core.Controller,
-    faults: FaultInjector | None = None,
+    faults: Callable[[TickInput], TickInput] | None = None,
     known: Cloud | None = None,
 ) -> Iterator[tuple[TickInput, TickResult]]:
     """Tick after tick until the source ends; `law` then holds the state after the yielded one.
@@ -26,7 +25,7 @@ def run_ticks(
     Args:
         source: of inputs; it is told each command.
         law: the controller.
-        faults: between source and tick.
+        faults: between source and tick, such as a `FaultInjector`.
         known: for ticks that are given the scene itself, where that is at the tick's place in the
             run: the caller's clock may be what is faulty.
     """
@@ -40,12 +39,13 @@ def run_ticks(
         elapsed = tick * law.config.period
         points_W = cloud(elapsed if given.known else 0.0)
         velocity_W = None if cloud.still else cloud.velocities(elapsed)
-        start = clock.perf_counter_ns()
+        start, cpu = clock.perf_counter_ns(), clock.thread_time_ns()
         if given.known:
             out = law.tick_known(given.time, given.q, points_W, given.goal, velocity_W)
         else:
             out = law.tick(given.time, given.q, scans, given.goal, given.late, given.q_stamp)
+        cpu_us = (clock.thread_time_ns() - cpu) / 1000.0
         tick_us = (clock.perf_counter_ns() - start) / 1000.0
-        result = TickResult.of(out, len(law.cloud_origins()), tick_us)
+        result = TickResult.of(out, len(law.cloud_origins()), tick_us, cpu_us)
         source.command(result.qd)
         yield given, result

@@ -12,6 +12,7 @@ from PIL import Image
 
 from proxcgal.errors import ConfigError
 from proxcgal.sim.frames import inverse, placed
+from proxcgal.sim.moment import without
 from proxcgal.sim.recording import Recording
 from proxcgal.sim.replay import Replay
 from proxcgal.sim.setup import Setup
@@ -157,9 +158,7 @@ def write_gif(frames: Sequence[Image.Image], path: Path, fps: float) -> None:
 
 def _marks(snapshot: Snapshot) -> Iterator[Spheres | Arrow]:
     result, goal = snapshot.tick.result, snapshot.tick.given.goal
-    kept = {point.tobytes() for point in snapshot.cloud_W}
-    dropped = [point.tobytes() not in kept for point in snapshot.raw_W]
-    yield Spheres(snapshot.raw_W[dropped], 0.005, _RAW)
+    yield Spheres(without(snapshot.raw_W, snapshot.cloud_W), 0.005, _RAW)
     yield Spheres(snapshot.cloud_W, 0.008, _FILTERED)
     if result.control_W is not None and result.obstacle_W is not None:
         yield Arrow(np.array(result.control_W), np.array(result.obstacle_W), 0.012, _PAIR)

@@ -71,9 +71,12 @@ class TickResult:
     tasks: tuple[TaskResult, ...] = ()
     findings: tuple[Found, ...] = ()
     tick_us: float = field(default=0.0, compare=False)  #: wall time of the call
+    cpu_us: float = field(default=0.0, compare=False)  #: the thread's own, not recorded
 
     @classmethod
-    def of(cls, out: _core.TickOutput, cloud_points: int, tick_us: float) -> TickResult:
+    def of(
+        cls, out: _core.TickOutput, cloud_points: int, tick_us: float, cpu_us: float = 0.0
+    ) -> TickResult:
         """Copies the controller's answer."""
         pair = out.pair
         return cls(
@@ -99,6 +102,7 @@ class TickResult:
                 Found(f.reason, f.sensor, f.zone, f.link, f.age, f.count) for f in out.findings
             ),
             tick_us=tick_us,
+            cpu_us=cpu_us,
         )
 
     def same(self, other: TickResult) -> bool:

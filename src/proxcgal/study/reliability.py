@@ -111,6 +111,16 @@ SHOWN: tuple[Shown, ...] = (
     Shown("hostile bytes in any input", "errors with a name only; no command outside the limits",
           ((_FUZZ, "TwentyThousandRandomTicksKeepEveryPromise"),
            ("tests/test_fuzz.py", "test_broken_files_raise_errors_of_ours_only"))),
+    Shown("hostile client of the live page", "loopback by default, a token beyond; sizes, counts, "
+          "rates and values bounded; no message leads out of a STOP",
+          (("tests/test_gate.py",
+            "test_without_the_token_neither_page_nor_connection_is_given"),
+           ("tests/test_gate.py", "test_pages_of_other_sites_are_refused"),
+           ("tests/test_gate.py", "test_a_message_that_no_page_needs_is_dropped"),
+           ("tests/test_gate.py", "test_a_value_outside_of_its_control_is_dropped"),
+           ("tests/test_gate.py", "test_a_flood_ends_its_connection_and_no_other"),
+           ("tests/test_gate.py", "test_a_viewer_that_vanishes_leaves_nothing_behind"),
+           ("tests/test_view.py", "test_nothing_that_a_page_says_leads_out_of_a_stop"))),
 )  # fmt: skip
 
 _LONG_CPP = "`./run test --long`"
@@ -219,8 +229,8 @@ that is 4 or 5 of 30 sensors. An offset of a sensor's ranges counts as a shift a
 what is held within 60 mm before the body may be taken for a wrong mount.
 """
 _END = """
-Not here: goals of the 12-joint server that are preempted or cancelled, and hostile clients of the
-live page and the server. Where a goal's last column is empty, its long form did not run to its end
+Not here: goals of the 12-joint server that are preempted or cancelled, and hostile clients of that
+server. Where a goal's last column is empty, its long form did not run to its end
 on this state of the code. Times of ticks and clouds: [benchmarks.md](benchmarks.md).
 """
 

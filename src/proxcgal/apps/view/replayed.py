@@ -1,0 +1,80 @@
+"""A recording as moments to draw: what was recorded, and what other settings make of its inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from proxcgal.apps.view.stage import Stage
+from proxcgal.sim.moment import Moment
+from proxcgal.sim.recording import Recording
+from proxcgal.sim.replay import Replay
+from proxcgal.sim.setup import Setup
+from proxcgal.sim.ticks import Tick
+
+AHEAD = 0.5  #: [s] that a recomputed command is followed for, to be seen
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Replayed:
+    """A run's moments, evenly in time."""
+
+    stage: Stage
+    controller: str
+    moments: tuple[Moment, ...]
+    same: int | None  #: ticks whose answers are the recorded ones bit for bit; None: not asked
+    ticks: int  #: of the recording
+
+
+def replayed(
+    recording: Recording,
+    hz: float,
+    controller: str | None = None,
+    overrides: Sequence[str] = (),
+    *,
+    ahead: bool = False,
+) -> Replayed:
+    """Computes a recording again, which gives its clouds too.
+
+    Args:
+        recording: of a run; one that holds scan ticks only is shown as recorded, without clouds.
+        hz: moments a second, at most one a tick.
+        controller: instead of the recorded one.
+        overrides: `key.sub=value` on the recorded scenario.
+        ahead: show the arm where its command would bring it within 0.5 s, not where it is.
+
+    Raises:
+        ConfigError: a bad override; what the recording does not hold.
+    """
+    settings = recording.settings
+    if settings.ticks != "all" and controller is None and not overrides:
+        setup = Setup.of(settings.scenario)
+        rows = range(len(recording.ticks))
+        moments = [_moment(setup, None, tick, tick.given.time) for tick in recording.ticks]
+        return Replayed(Stage.of(setup), settings.controller, tuple(moments), None, len(rows))
+    again = Replay(recording, controller, overrides)
+    period = again.law.config.period
+    step = max(round(1.0 / (hz * period)), 1)
+    last = len(recording.ticks) - 1
+    moments, same = [], 0
+    for row, (then, now) in enumerate(zip(recording.ticks, again, strict=True)):
+        same += now.result.same(then.result)
+        if row % step == 0 or row == last:
+            moments.append(_moment(again.setup, again, now, row * period))
+    if ahead:
+        moments = [_ahead(again.setup, moment) for moment in moments]
+    return Replayed(
+        Stage.of(again.setup), again.controller, tuple(moments), same, len(recording.ticks)
+    )
+
+
+def _moment(setup: Setup, again: Replay | None, tick: Tick, elapsed: float) -> Moment:
+    law = None if again is None else again.law
+    return Moment.of(setup, tick.given, tick.result, law, elapsed, true=tick.truth.distance)
+
+
+def _ahead(setup: Setup, moment: Moment) -> Moment:
+    q = np.clip(moment.q + AHEAD * moment.qd, setup.robot.q_min, setup.robot.q_max)
+    return replace(moment, links_W=np.asarray(setup.robot.link_poses(q)))

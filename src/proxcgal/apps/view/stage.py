@@ -1,0 +1,75 @@
+"""What a page shows and what does not change while it does; plain data, for another process too."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxcgal.models.display import display_meshes
+from proxcgal.sim.setup import Setup
+from proxcgal.sim.solids import Solid
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Stage:
+    """One robot with its sensors, and the scene's solids."""
+
+    robot: str
+    scenario: str
+    links: tuple[str, ...]
+    meshes: tuple[tuple[NDArray[np.float32], NDArray[np.uint32]], ...]  #: vertices_L, triangles
+    sensors: tuple[str, ...]
+    sensor_links: tuple[int, ...]  #: row of each sensor's link
+    sensors_L: Array  #: (sensors, 4, 4) T_LS
+    field_of_view: float  #: [rad] of a sensor, from side to side
+    names: tuple[str, ...]  #: of the solids
+    solids: tuple[Solid, ...]
+    solids_W: Array  #: (solids, 4, 4) T_WO at the start
+    tool_W: Array  #: (3,) at the start [m]
+    d_min: float  #: [m]
+    buffer: float  #: [m]
+    gain: float  #: [1/s]
+
+    @classmethod
+    def of(cls, setup: Setup) -> Self:
+        """Of what a trial is set up with; its solids where they are at the start."""
+        links = list(setup.robot.link_names)
+        mounts = setup.skin.mounts
+        law = setup.scenario.controller
+        return cls(
+            robot=setup.robot.name,
+            scenario=setup.scenario.name,
+            links=tuple(links),
+            meshes=tuple(
+                (np.asarray(v, np.float32), np.asarray(f, np.uint32))
+                for v, f in display_meshes(setup.robot)
+            ),
+            sensors=tuple(mount.name for mount in mounts),
+            sensor_links=tuple(links.index(mount.link) for mount in mounts),
+            sensors_L=np.array([mount.T_LS for mount in mounts]).reshape(-1, 4, 4),
+            field_of_view=setup.scenario.skin.sensor.field_of_view,
+            names=setup.scene.names,
+            solids=setup.scene.solids,
+            solids_W=np.asarray(setup.scene.poses(0.0)),
+            tool_W=np.asarray(setup.robot.tool_pose(setup.q0))[:3, 3],
+            d_min=law.d_min,
+            buffer=law.buffer,
+            gain=law.avoid_gain,
+        )
+
+    @property
+    def key(self) -> tuple[Any, ...]:
+        """The same for stages that need no drawing anew."""
+        return (
+            self.robot,
+            self.links,
+            self.sensors,
+            self.names,
+            self.solids,
+            self.sensors_L.tobytes(),
+        )

@@ -1,0 +1,168 @@
+"""The live page in a real browser: what is dragged and switched there reaches the arm."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+
+from browser import Tab, pixel, until
+from proxcgal.apps.view.controls import HANDLE
+from proxcgal.apps.view.gate import close, serve
+from proxcgal.apps.view.live import LivePage
+from proxcgal.sim.moment import Moment
+from proxcgal.sim.scenario import load_scenario
+
+
+class Live:
+    """A live page of a scene, open in a browser."""
+
+    def __init__(self, folder: Path, open_tab: Callable[[], Tab]) -> None:
+        self.folder = folder
+        self.scenario = load_scenario("front_plane")
+        self.server, self.gate = serve("127.0.0.1", 0, label="proxcgal: front_plane")
+        self.page = LivePage(self.server, self.gate, self.scenario, "wb")
+        self.address = f"http://127.0.0.1:{self.server.get_port()}/"
+        assert until(lambda: self.page.told.moment is not None)
+        self.open_tab = open_tab
+        self.tab = open_tab()
+        self.tab.open(self.address)
+        assert until(lambda: len(self.server.get_clients()) == 1)
+        self.tab.page.get_by_text("activation of avoidance").wait_for()
+
+    @property
+    def moment(self) -> Moment:
+        assert self.page.told.moment is not None
+        return self.page.told.moment
+
+    @property
+    def camera(self):  # type: ignore[no-untyped-def]
+        return next(iter(self.server.get_clients().values())).camera
+
+    def passed(self, seconds: float) -> None:
+        """Waits for that much simulated time."""
+        end = self.moment.elapsed + seconds
+        assert until(lambda: self.moment.elapsed >= end, 90.0)
+
+    def press(self, label: str) -> None:
+        self.tab.page.get_by_role("button", name=label, exact=True).first.click()
+
+
+@pytest.fixture(scope="module")
+def live(open_tab: Callable[[], Tab], tmp_path_factory: pytest.TempPathFactory) -> Iterator[Live]:
+    live = Live(tmp_path_factory.mktemp("page"), open_tab)
+    try:
+        yield live
+    finally:
+        live.tab.page.close()
+        live.page.close()
+        close(live.server)
+
+
+def test_the_page_asks_no_other_host_for_anything(live: Live) -> None:
+    live.passed(1.0)
+    hosts = {urlsplit(url.removeprefix("blob:")).netloc for url in live.tab.requests}
+    assert hosts == {urlsplit(live.address).netloc}
+    assert live.tab.errors == []
+    assert live.gate.dropped == 0  # the gate knows all that a real page sends
+    live.tab.picture("page", live.folder)
+
+
+def test_dragging_the_obstacle_to_the_flange_raises_activation_and_the_arm_goes_away(
+    live: Live,
+) -> None:
+    assert until(lambda: live.moment.elapsed > 4.0, 90.0)
+    before, tool = live.moment, live.moment.links_W[-1][:3, 3]
+    handle = live.server.scene._handle_from_transform_controls_name[HANDLE]
+    center = np.array(handle.position)
+    along = np.array([0.2, 0.0, 0.0])  # on the handle's arrow along x
+    (x0, y0), (x1, y1) = pixel(live.camera, center + along), pixel(live.camera, center - along)
+    mouse = live.tab.page.mouse
+    mouse.move(x0, y0)
+    live.tab.page.wait_for_timeout(300)
+    mouse.down()
+    for share in np.linspace(0.0, 1.0, 15):
+        mouse.move(x0 + share * (x1 - x0), y0 + share * (y1 - y0))
+        live.tab.page.wait_for_timeout(40)
+    highest = before.activation
+
+    def went_away() -> bool:
+        nonlocal highest
+        highest = max(highest, live.moment.activation)
+        return bool(live.moment.links_W[-1][0, 3] < tool[0] - 0.1)
+
+    assert until(went_away, 90.0)
+    live.passed(0.5)
+    live.tab.picture("dragged", live.folder)
+    mouse.up()
+    assert live.moment.solids_W[0][0, 3] < before.solids_W[0][0, 3] - 0.15
+    assert highest > before.activation + 0.2
+
+
+def test_a_sensor_that_is_switched_off_leaves_the_cloud(live: Live) -> None:
+    page = live.tab.page
+    before = live.moment
+    assert len(before.held_W) == 0
+    page.get_by_text("sensors", exact=True).click()
+    for row in (1, 2, 3):
+        page.get_by_label(f"forearm_link/ring2/{row}", exact=True).click()
+    assert until(lambda: len(live.moment.held_W) > 5)
+    live.passed(0.5)
+    held = live.moment.held_W
+    live.passed(0.3)
+    assert np.array_equal(live.moment.held_W, held)
+    assert len(live.moment.kept_W) < len(before.kept_W)
+    assert live.moment.mode > 0
+    live.tab.picture("silent", live.folder)
+
+
+def test_a_slider_changes_the_law_and_the_arm_goes_on_where_it_is(live: Live) -> None:
+    q = live.moment.q
+    slider = live.tab.page.get_by_role("slider").first
+    slider.focus()
+    slider.press("ArrowRight")
+    slider.press("ArrowRight")
+    wanted = live.scenario.controller.d_min + 0.02
+    assert until(lambda: live.page.bounds[0] == pytest.approx(wanted))
+    live.passed(0.1)
+    assert np.abs(live.moment.q - q).max() < 0.3
+
+
+def test_reset_and_pause_are_heard(live: Live) -> None:
+    live.press("pause")
+    assert until(lambda: not live.page.told.running)
+    live.press("reset")
+    assert until(lambda: live.moment.elapsed < 1.0)
+    assert np.allclose(live.moment.q, live.scenario.q0)
+    live.press("step")
+    assert until(lambda: 0.0 < live.moment.elapsed < 0.1)
+
+
+def test_a_second_viewer_sees_the_same_and_leaves_nothing_behind(live: Live) -> None:
+    tab = live.open_tab()
+    tab.open(live.address)
+    assert until(lambda: live.gate.viewers == 2)
+    tab.page.get_by_text("paused").wait_for()
+    assert tab.errors == []
+    tab.page.close()
+    assert until(lambda: live.gate.viewers == 1)
+    assert len(live.server.get_clients()) == 1
+
+
+def test_a_browser_needs_the_token_and_keeps_it(open_tab: Callable[[], Tab]) -> None:
+    token = "correct-horse-battery"
+    server, gate = serve("127.0.0.1", 0, label="guarded", token=token)
+    server.gui.add_markdown("inside")
+    address = f"http://127.0.0.1:{server.get_port()}/"
+    try:
+        tab = open_tab()
+        tab.open(address)
+        assert "a token is needed" in tab.page.content()
+        assert gate.viewers == 0
+        tab.open(f"{address}?token={token}")
+        tab.page.get_by_text("inside").wait_for()
+        assert gate.viewers == 1
+        tab.page.close()
+    finally:
+        close(server)
