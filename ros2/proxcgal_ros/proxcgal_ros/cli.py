@@ -41,21 +41,27 @@ def _node(options: argparse.Namespace, arguments: list[str]) -> int:
 
 
 def _sim(options: argparse.Namespace, arguments: list[str]) -> int:
+    from contextlib import nullcontext
+
     from proxcgal.sim.scenario import load_scenario
 
     from proxcgal_ros.processes import spinning
-    from proxcgal_ros.sim import SimulatedRobot
+    from proxcgal_ros.sim import SimulatedArm, SimulatedSensors, sensors_beside
 
     scenario = load_scenario(options.scenario, options.set)
     seed = scenario.seed if options.seed is None else options.seed
+    node: SimulatedArm | SimulatedSensors
     with spinning(arguments) as (executor, running):
-        node = SimulatedRobot(executor, running, scenario, seed, options.only)
+        if options.only == "scans":
+            node = SimulatedSensors(executor, running, scenario, seed)
+        else:
+            node = SimulatedArm(executor, running, scenario)
         executor.add_node(node)
-        try:
+        beside = sensors_beside([arguments[1], "--only", "scans", *arguments[2:]])
+        with nullcontext() if options.only else beside:
             node.run()
-        finally:
-            node.destroy_node()
-    if options.out is not None:
+        node.destroy_node()
+    if options.out is not None and isinstance(node, SimulatedArm):
         node.write(options.out)
     return 0
 
@@ -110,8 +116,8 @@ def _parser() -> argparse.ArgumentParser:
     sim.add_argument("scenario", help="a built-in scenario's name, or a path")
     sim.add_argument("--seed", type=int, help="instead of the scenario's")
     sim.add_argument(
-        "--only", choices=("all", "arm", "scans"), default="all",
-        help="the arm without sensors, or sensors that ride on another process's joint states",
+        "--only", choices=("arm", "scans"),
+        help="the arm without its sensors, or the sensors without their arm",
     )  # fmt: skip
     sim.add_argument("--out", type=Path, help="JSON file for the true distances")
     sim.set_defaults(run=_sim)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import array
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,8 @@ from proxcgal.sim.ticks import TickResult
 from proxcgal_msgs.msg import Proximity, SensorArray, SensorScan
 from sensor_msgs.msg import JointState, PointCloud2, PointField
 from std_msgs.msg import Float64MultiArray, Header, MultiArrayDimension
+
+from proxcgal_ros.restarts import Restarts
 
 Array = NDArray[np.float64]
 SECOND = 1_000_000_000  # [ns]
@@ -110,22 +112,27 @@ def scan_messages(
     return told
 
 
-def scans_of(message: SensorArray, rows: Sequence[int], to_seconds: Any) -> list[_core.Scan]:
+def scans_of(
+    message: SensorArray, rows: Sequence[int], carried: Callable[[int], float], now: float,
+    restarts: Restarts,
+) -> list[_core.Scan]:  # fmt: skip
     """The scans of an array's message; a sensor it does not have becomes one unknown to the skin.
 
     Args:
-        message: at most the first scan of each of its sensors twice is looked at.
+        message: of its scans at most two for each sensor are looked at.
         rows: of the skin, in the array's order.
-        to_seconds: from a stamp [ns] to the controller's clock [s].
+        carried: from a stamp [ns] to the controller's clock [s].
+        now: [s] of its receipt, on that clock.
+        restarts: of the sensors.
     """
-    return [
-        _core.Scan(
-            rows[scan.sensor] if scan.sensor < len(rows) else -1,
-            scan.counter, to_seconds(nanoseconds(scan.stamp)),
-            np.asarray(scan.ranges, np.float64), np.asarray(scan.status, np.uint8),
-        )
-        for scan in message.scans[: 2 * len(rows)]
-    ]  # fmt: skip
+    scans = []
+    for scan in message.scans[: 2 * len(rows)]:
+        row = rows[scan.sensor] if scan.sensor < len(rows) else -1
+        stamp = carried(nanoseconds(scan.stamp))
+        counter = restarts.counter(row, scan.counter, stamp, now)
+        ranges = np.asarray(scan.ranges, np.float64)
+        scans.append(_core.Scan(row, counter, stamp, ranges, np.asarray(scan.status, np.uint8)))
+    return scans
 
 
 def proximity_message(result: TickResult, head: Header) -> Proximity:

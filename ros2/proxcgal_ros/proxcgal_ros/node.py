@@ -33,6 +33,7 @@ from proxcgal_ros.source import RosSource
 
 LIVE_CONTROLLERS = ("wb", "sm")
 VIEWS_HZ = 2.0  # fields of view are many lines
+PATIENCE = 1.25  # of the clouds' period
 EARLY = 0.75  # of a display's period: what comes at its rate, but not evenly, is not left out
 
 
@@ -77,7 +78,7 @@ class ControllerNode(Node):
         self._views = Views(setup.robot, setup.skin)
         self._sensors = [mount.name for mount in setup.skin.mounts]
         self._shown = {"cloud_hz": -np.inf, "diagnostics_hz": -np.inf, "views": -np.inf}
-        self._waiting = False  # scans that no cloud has shown yet
+        self._cloud_ns = 0  # stamp of the last cloud
         self._goal_told: object = None
         out = topics.RELIABLE_QOS
         keep = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -129,10 +130,9 @@ class ControllerNode(Node):
         """After the command has gone out: what others look at."""
         head = header(self.source.q_stamp_ns, self._frame)
         self._proximity.publish(proximity_message(result, head))
-        self._waiting = self._waiting or bool(given.scans)
-        if self._waiting and self._turn("cloud_hz", given.time, self._hz["cloud_hz"]):
-            self._waiting = False
-            seen = header(self.source.scan_stamp_ns, self._frame)
+        if self._cloud_due(given.time):
+            self._cloud_ns = max(self.source.scan_stamps_ns.values())
+            seen = header(self._cloud_ns, self._frame)
             origins = np.asarray(self.law.cloud_origins())
             self._cloud.publish(cloud_message(np.asarray(self.law.cloud_W()), origins, seen))
             if self._markers.get_subscription_count():
@@ -145,6 +145,15 @@ class ControllerNode(Node):
         if given.goal is not self._goal_told:
             self._goal_told = given.goal
             self._goal.publish(pose_message(given.goal, head))
+
+    def _cloud_due(self, time: float) -> bool:
+        """Once all arrays have told something new; where one does not, it is not waited for."""
+        new = [stamp > self._cloud_ns for stamp in self.source.scan_stamps_ns.values()]
+        hz = self._hz["cloud_hz"]
+        patient = time - self._shown["cloud_hz"] < PATIENCE / hz
+        if not any(new) or (patient and not all(new)):
+            return False
+        return self._turn("cloud_hz", time, hz)
 
     def _turn(self, what: str, time: float, hz: float) -> bool:
         """Is it time for this display again?"""
