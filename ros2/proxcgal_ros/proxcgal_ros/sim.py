@@ -183,8 +183,14 @@ class SimulatedSensors(Node):
         if q is None or not np.isfinite(q).all():
             return
         stamp = nanoseconds(message.header.stamp)
+        if self._stamp_ns == 0:  # put where the arm stands: nothing was measured on the way there
+            self._source.command((q - self._q) / self._period)
+            self._source.read()
+            self._source.read()
+            self._q, self._stamp_ns = q, stamp
+            return
         gap = (stamp - self._stamp_ns) / (self._period * SECOND)
-        steps = min(max(round(gap), 1), LONGEST_GAP) if self._stamp_ns else 1
+        steps = min(max(round(gap), 1), LONGEST_GAP)
         self._stamp_ns = stamp
         qd = (q - self._q) / (steps * self._period)
         for step in range(steps):

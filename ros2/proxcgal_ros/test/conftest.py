@@ -21,6 +21,9 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
+# This machine only; and not by shared memory, which a process that is killed can leave locked.
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+os.environ["FASTDDS_BUILTIN_TRANSPORTS"] = "UDPv4"
 with suppress(PermissionError):
     os.setpriority(os.PRIO_PROCESS, 0, -10)  # what it hears has times
 LIFE = 150  # [s] after which a process ends by itself, whatever became of the test

@@ -82,9 +82,9 @@ def test_clouds_come_at_the_sensors_rate_with_their_frame_and_stamp(arm: Client)
 def silence(arm: Client, processes: Processes, sensors: str) -> tuple[float, float]:
     """Kills that publisher. How long HOLD took [s], and how long the machine stood still in it."""
     heard = arm.modes()
+    heard.clear()
     processes.kill(sensors)
     killed = time.monotonic()
-    heard.clear()
     assert arm.until(lambda: heard and heard[-1][1].mode == Proximity.HOLD, 5.0)
     arm.spin(0.05)
     at, near = next((at, near) for at, near in heard if near.mode == Proximity.HOLD)
@@ -102,14 +102,15 @@ def test_a_killed_sensor_publisher_brings_hold_within_200_ms(
     sensors = "sensors"
     for attempt in range(4):  # one in which the machine stood still does not count
         arm.send(goal(z=0.3 if attempt % 2 == 0 else -0.3))
-        arm.spin(1.0)
+        arm.spin(0.5)
+        assert arm.until(lambda: all(near.mode == Proximity.RUN for _, near in heard[-20:]), 30.0)
         took, still = silence(arm, processes, sensors)
         print(f"HOLD {1e3 * took:.0f} ms after the kill; the longest pause {1e3 * still:.0f} ms")
         if still < 0.03:
             break
         sensors = f"sensors{attempt}"
         processes.start(sensors, "sim", "front_plane", "--only", "scans", "--seed", f"{attempt}")
-        assert arm.until(lambda: heard[-1][1].mode == Proximity.RUN, 20.0)
+        assert arm.until(lambda: heard[-1][1].mode == Proximity.RUN, 60.0)
     assert took <= 0.2
 
     # And the arm rests, within its limits: it is told zero.
@@ -124,7 +125,7 @@ def test_a_killed_sensor_publisher_brings_hold_within_200_ms(
 
     # New scans, and it goes on by itself.
     processes.start("again", "sim", "front_plane", "--only", "scans", "--seed", "9")
-    assert arm.until(lambda: heard[-1][1].mode == Proximity.RUN, 20.0)
+    assert arm.until(lambda: heard[-1][1].mode == Proximity.RUN, 60.0), heard[-1][1].findings
 
 
 def test_joint_states_that_stop_hold_the_arm_and_then_stop_it(
