@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from rosbags.highlevel import AnyReader, AnyReaderError
+
 from proxcgal.errors import ConfigError
 from proxcgal.sim.loop import run_ticks
 from proxcgal.sim.recorder import Recorder, Settings
@@ -15,8 +17,6 @@ from proxcgal.sim.scenario import Scenario, change_scenario, load_scenario, pars
 from proxcgal.sim.setup import Setup
 from proxcgal.sim.source import RecordedSource
 from proxcgal.sim.ticks import Tick, TickInput, TickResult, TickTruth
-from rosbags.highlevel import AnyReader, AnyReaderError
-
 from proxcgal_ros import topics
 from proxcgal_ros.bags import decoded, typestore
 from proxcgal_ros.convert import SECOND, joint_positions, nanoseconds, pose_of, scans_of
@@ -88,9 +88,7 @@ def replay_bag(
     }
 
 
-def _scenario(
-    content: _Content, bag: Path, name: str | None, changes: Sequence[str]
-) -> Scenario:
+def _scenario(content: _Content, bag: Path, name: str | None, changes: Sequence[str]) -> Scenario:
     if name is not None:
         return load_scenario(name, changes)
     if content.scenario is None:

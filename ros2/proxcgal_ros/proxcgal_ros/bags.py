@@ -7,9 +7,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from proxcgal.errors import ConfigError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
+
+from proxcgal.errors import ConfigError
 
 MESSAGES = "proxcgal_msgs"
 _HEAD = 4  # of a serialized message: byte order
@@ -48,5 +49,3 @@ def _messages() -> Path:
         if place and (folder / "msg").is_dir():
             return folder
     raise ConfigError(f"{MESSAGES} is not installed; looked in {', '.join(filter(None, places))}")
-
-

@@ -7,8 +7,9 @@ import json
 import sys
 from pathlib import Path
 
-from proxcgal.errors import ProxError
 from rclpy.utilities import remove_ros_args
+
+from proxcgal.errors import ProxError
 
 
 def main() -> int:
@@ -21,6 +22,8 @@ def main() -> int:
         for line in str(error).splitlines():
             print(f"error: {line}", file=sys.stderr)
         return 2
+    except KeyboardInterrupt:  # before a node took its signals over
+        return 130
 
 
 def _node(options: argparse.Namespace, arguments: list[str]) -> int:
@@ -44,7 +47,6 @@ def _sim(options: argparse.Namespace, arguments: list[str]) -> int:
     from contextlib import nullcontext
 
     from proxcgal.sim.scenario import load_scenario
-
     from proxcgal_ros.processes import spinning
     from proxcgal_ros.sim import SimulatedArm, SimulatedSensors, sensors_beside
 

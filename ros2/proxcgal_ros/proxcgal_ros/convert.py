@@ -10,12 +10,12 @@ import numpy as np
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point, PoseStamped, Quaternion
 from numpy.typing import NDArray
-from proxcgal import _core
-from proxcgal.sim.ticks import TickResult
 from proxcgal_msgs.msg import Proximity, SensorArray, SensorScan
 from sensor_msgs.msg import JointState, PointCloud2, PointField
 from std_msgs.msg import Float64MultiArray, Header, MultiArrayDimension
 
+from proxcgal import _core
+from proxcgal.sim.ticks import TickResult
 from proxcgal_ros.restarts import Restarts
 
 Array = NDArray[np.float64]

@@ -8,12 +8,12 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Point
 from numpy.typing import NDArray
-from proxcgal import _core
-from proxcgal.models import Robot
-from proxcgal.sim.ticks import TickResult
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
+from proxcgal import _core
+from proxcgal.models import Robot
+from proxcgal.sim.ticks import TickResult
 from proxcgal_ros.convert import point
 
 Array = NDArray[np.float64]

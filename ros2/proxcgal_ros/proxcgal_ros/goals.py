@@ -9,6 +9,7 @@ from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
 from proxcgal.errors import ProxError
 from proxcgal.models import Robot
 from proxcgal.sim import frames

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from proxcgal.apps import joint_server
 from rclpy.executors import Executor
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
+from proxcgal.apps import joint_server
 from proxcgal_ros import topics
 from proxcgal_ros.action import MoveRobotAction
 from proxcgal_ros.convert import header, joint_message

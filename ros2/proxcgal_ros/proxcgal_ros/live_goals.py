@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
 from proxcgal import _core
 from proxcgal.models import Robot
 from proxcgal.sim.ticks import TickInput, TickResult
-
 from proxcgal_ros.goals import (
     BASE,
     Feedback,

@@ -9,12 +9,6 @@ from pathlib import Path
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
-from proxcgal.errors import ConfigError
-from proxcgal.sim.loop import run_ticks
-from proxcgal.sim.recorder import Recorder, Settings
-from proxcgal.sim.scenario import change_scenario, load_scenario
-from proxcgal.sim.setup import Setup
-from proxcgal.sim.ticks import Tick, TickInput, TickResult, TickTruth
 from proxcgal_msgs.msg import Proximity
 from rclpy.executors import Executor
 from rclpy.node import Node
@@ -23,6 +17,12 @@ from sensor_msgs.msg import PointCloud2
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
+from proxcgal.errors import ConfigError
+from proxcgal.sim.loop import run_ticks
+from proxcgal.sim.recorder import Recorder, Settings
+from proxcgal.sim.scenario import change_scenario, load_scenario
+from proxcgal.sim.setup import Setup
+from proxcgal.sim.ticks import Tick, TickInput, TickResult, TickTruth
 from proxcgal_ros import parameters, topics
 from proxcgal_ros.action import MoveRobotAction
 from proxcgal_ros.clocks import Clocks

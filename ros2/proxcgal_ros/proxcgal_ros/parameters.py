@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from proxcgal.errors import ConfigError
 from rcl_interfaces.msg import (
     FloatingPointRange,
     ParameterDescriptor,
@@ -15,6 +14,8 @@ from rcl_interfaces.msg import (
 from rclpy.exceptions import InvalidParameterValueException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+
+from proxcgal.errors import ConfigError
 
 SECOND_GOAL = ("preempt", "refuse")
 
@@ -39,7 +40,10 @@ TUNING: dict[str, Number] = {
 }
 #: The node's own, with their defaults.
 RULES: dict[str, tuple[float, Number]] = {
-    "goal_timeout": (60.0, Number(0.1, 3600.0, "[s] a goal that is not reached by then is aborted")),
+    "goal_timeout": (
+        60.0,
+        Number(0.1, 3600.0, "[s] a goal that is not reached by then is aborted"),
+    ),
     "position_tolerance": (0.03, Number(0.001, 0.5, "[m] from the goal; nearer is there")),
     "angle_tolerance": (0.05, Number(0.001, 1.0, "[rad] from the goal; nearer is there")),
     "cloud_hz": (15.0, Number(0.1, 100.0, "[1/s] clouds and markers, at most")),

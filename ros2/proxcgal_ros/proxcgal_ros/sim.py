@@ -16,18 +16,18 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from proxcgal.sim.decisive import decisive_truth
-from proxcgal.sim.scenario import Scenario, change_scenario
-from proxcgal.sim.setup import Setup
-from proxcgal.sim.source import SimulatedSource
-from proxcgal.sim.trial_log import NOTHING, TOO_CLOSE, final_ticks
-from proxcgal.sim.world import Hits, World
 from proxcgal_msgs.msg import SensorArray
 from rclpy.executors import Executor
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
+from proxcgal.sim.decisive import decisive_truth
+from proxcgal.sim.scenario import Scenario, change_scenario
+from proxcgal.sim.setup import Setup
+from proxcgal.sim.source import SimulatedSource
+from proxcgal.sim.trial_log import NOTHING, TOO_CLOSE, final_ticks
+from proxcgal.sim.world import Hits, World
 from proxcgal_ros import topics
 from proxcgal_ros.convert import (
     SECOND,
@@ -50,9 +50,7 @@ ENDLESS = 1e9  # [s]
 class SimulatedArm(Node):
     """Follows its velocity commands exactly; the scenario begins with the first that moves it."""
 
-    def __init__(
-        self, executor: Executor, running: Callable[[], bool], scenario: Scenario
-    ) -> None:
+    def __init__(self, executor: Executor, running: Callable[[], bool], scenario: Scenario) -> None:
         """Loads the scenario. Raises: ProxError."""
         super().__init__("proxcgal_arm")
         self._executor, self._running = executor, running

@@ -7,15 +7,15 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
-from proxcgal import _core
-from proxcgal.sim.setup import Setup
-from proxcgal.sim.ticks import TickInput
 from proxcgal_msgs.msg import SensorArray
 from rclpy.executors import Executor
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
+from proxcgal import _core
+from proxcgal.sim.setup import Setup
+from proxcgal.sim.ticks import TickInput
 from proxcgal_ros import topics
 from proxcgal_ros.clocks import Clocks
 from proxcgal_ros.convert import command_message, joint_positions, nanoseconds, scans_of

@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from proxcgal.models import Robot
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+from proxcgal.models import Robot
 
 JOINT_STATES = "joint_states"
 SCANS = "scans"  # and below it one topic for each array

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 from action_msgs.msg import GoalStatus
-from conftest import PATIENT, Client, Processes, goal
 from proxcgal_msgs.msg import Proximity
+
+from conftest import PATIENT, Client, Processes, goal
 
 RUN = Proximity.RUN
 

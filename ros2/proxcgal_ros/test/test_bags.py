@@ -8,11 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mcap.reader import make_reader
-from proxcgal.errors import ConfigError
-from proxcgal.sim.recorder import Recorder
-from proxcgal.sim.recording import Recording, read_recording
-from proxcgal.sim.scenario import load_scenario
-from proxcgal.sim.trial import run_trial
 from proxcgal_msgs.msg import Proximity, SensorArray
 from proxcgal_ros.bag_read import replay_bag
 from proxcgal_ros.bag_write import write_bag
@@ -21,6 +16,12 @@ from proxcgal_ros.convert import cloud_rows, nanoseconds, pose_of, quaternion, r
 from rclpy.serialization import deserialize_message
 from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import JointState, PointCloud2
+
+from proxcgal.errors import ConfigError
+from proxcgal.sim.recorder import Recorder
+from proxcgal.sim.recording import Recording, read_recording
+from proxcgal.sim.scenario import load_scenario
+from proxcgal.sim.trial import run_trial
 
 
 @pytest.fixture(scope="module")
@@ -130,8 +131,11 @@ def test_quaternions_are_the_rotations_they_stand_for(seed: int) -> None:
 
 
 def test_a_pose_goes_through_a_message_unchanged() -> None:
-    from proxcgal.sim import frames
     from proxcgal_ros.convert import header, pose_message
 
+    from proxcgal.sim import frames
+
     T_WT = frames.pose([0.3, -0.2, 0.9], [0.1, 1.2, -3.0])
-    np.testing.assert_allclose(pose_of(pose_message(T_WT, header(0, "base_link"))), T_WT, atol=1e-12)
+    np.testing.assert_allclose(
+        pose_of(pose_message(T_WT, header(0, "base_link"))), T_WT, atol=1e-12
+    )

@@ -6,6 +6,7 @@ import importlib.util
 
 import pytest
 from action_msgs.msg import GoalStatus
+
 from conftest import Client, Processes, goal
 
 pytestmark = pytest.mark.skipif(

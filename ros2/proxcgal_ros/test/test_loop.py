@@ -6,11 +6,12 @@ import json
 from pathlib import Path
 
 import pytest
+from proxcgal_msgs.msg import Proximity
+
 from conftest import PATIENT, Client, Processes, goal
 from proxcgal.sim.scenario import load_scenario
 from proxcgal.sim.setup import Setup
 from proxcgal.sim.trial import run_trial
-from proxcgal_msgs.msg import Proximity
 
 SCENE = "front_plane"
 

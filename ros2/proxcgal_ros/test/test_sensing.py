@@ -6,11 +6,8 @@ import time
 
 import numpy as np
 import pytest
-from conftest import PATIENT, Client, Processes, goal
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseStamped
-from proxcgal.sim.scenario import load_scenario
-from proxcgal.sim.setup import Setup
 from proxcgal_msgs.msg import Proximity, SensorArray
 from proxcgal_ros.convert import cloud_rows, nanoseconds, pose_of
 from rcl_interfaces.srv import DescribeParameters, SetParameters
@@ -18,6 +15,10 @@ from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Float64MultiArray
 from visualization_msgs.msg import Marker, MarkerArray
+
+from conftest import PATIENT, Client, Processes, goal
+from proxcgal.sim.scenario import load_scenario
+from proxcgal.sim.setup import Setup
 
 
 def started(processes: Processes, client: Client, *arguments: str) -> Client:
