@@ -80,7 +80,7 @@ def joint_message(names: Sequence[str], q: Array, qd: Array, head: Header) -> Jo
 
 
 def joint_positions(message: JointState, names: Sequence[str]) -> Array | None:
-    """(n_q,) in the order of `names`, whatever else the message holds; None where one is missing."""
+    """(n_q,) in the order of `names`, whatever else is told; None where one is missing."""
     if list(message.name) == list(names) and len(message.position) == len(names):
         return np.array(message.position, np.float64)
     place = dict(zip(message.name, message.position, strict=False))
@@ -149,7 +149,7 @@ def proximity_message(result: TickResult, head: Header) -> Proximity:
 
 
 def point(values: Sequence[float]) -> Point:
-    """[m]"""
+    """A point [m]."""
     return Point(x=float(values[0]), y=float(values[1]), z=float(values[2]))
 
 

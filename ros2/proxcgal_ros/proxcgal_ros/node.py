@@ -38,7 +38,7 @@ EARLY = 0.75  # of a display's period: what comes at its rate, but not evenly, i
 
 
 class ControllerNode(Node):
-    """One controller between the topics. Raises: ProxError, all that does not fit, one line each."""
+    """One controller between the topics. Raises: ProxError, a line for all that does not fit."""
 
     def __init__(self, executor: Executor, running: Callable[[], bool]) -> None:
         """Reads the parameters, loads robot and skin, subscribes and publishes.

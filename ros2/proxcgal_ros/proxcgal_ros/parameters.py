@@ -1,4 +1,4 @@
-"""The node's parameters: declared with ranges and descriptions, most of them changed at run time."""
+"""The node's parameters: declared with ranges and descriptions; most may change at run time."""
 
 from __future__ import annotations
 
