@@ -16,7 +16,7 @@ setup(
         (f"share/{NAME}/launch", ["launch/sim.launch.py"]),
     ],
     python_requires=">=3.11",
-    install_requires=["proxcgal"],
+    install_requires=["proxcgal", "rosbags>=0.11.9,<0.12"],
     zip_safe=True,
     entry_points={"console_scripts": [f"{NAME} = {NAME}.cli:main"]},
 )
