@@ -140,7 +140,7 @@ def _parser() -> argparse.ArgumentParser:
     replay = commands.add_parser("replay", help="a bag's scans and joint states, recomputed")
     replay.add_argument("bag", type=Path, help="folder of a ROS 2 bag")
     replay.add_argument("--scenario", help="name or path; left out: the one in the bag")
-    replay.add_argument("--controller", choices=("wb", "sm"), help="instead of the bag's, or wb")
+    replay.add_argument("--controller", choices=("wb", "sm", "wb_memory"), default="wb")
     replay.add_argument("--out", type=Path, help="recording to write")
     replay.set_defaults(run=_replay)
 

@@ -20,7 +20,7 @@ from visualization_msgs.msg import MarkerArray
 from proxcgal.errors import ConfigError
 from proxcgal.sim.loop import run_ticks
 from proxcgal.sim.recorder import Recorder, Settings
-from proxcgal.sim.scenario import change_scenario, load_scenario
+from proxcgal.sim.scenario import CONTROLLERS, change_scenario, load_scenario
 from proxcgal.sim.setup import Setup
 from proxcgal.sim.ticks import Tick, TickInput, TickResult, TickTruth
 from proxcgal_ros import parameters, topics
@@ -31,7 +31,7 @@ from proxcgal_ros.display import Views, diagnostics, markers, pair_marker
 from proxcgal_ros.live_goals import LiveGoals, Rules
 from proxcgal_ros.source import RosSource
 
-LIVE_CONTROLLERS = ("wb", "sm")
+LIVE_CONTROLLERS = tuple(name for name in CONTROLLERS if name != "wb_known")
 VIEWS_HZ = 2.0  # fields of view are many lines
 PATIENCE = 1.25  # of the clouds' period
 EARLY = 0.75  # of a display's period: what comes at its rate, but not evenly, is not left out
@@ -53,7 +53,7 @@ class ControllerNode(Node):
             "robot, skin and controller: a built-in scenario's name or a path",
         )  # fmt: skip
         changes = parameters.fixed_texts(self, "set", "KEY=VALUE on the scenario")
-        controller = parameters.fixed_text(self, "controller", "wb", "wb or sm")
+        controller = parameters.fixed_text(self, "controller", "wb", " or ".join(LIVE_CONTROLLERS))
         if controller not in LIVE_CONTROLLERS:
             raise ConfigError(
                 f"parameter controller = {controller!r}: must be {' or '.join(LIVE_CONTROLLERS)}"
