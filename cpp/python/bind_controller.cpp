@@ -1,4 +1,5 @@
 #include <nanobind/stl/map.h>
+#include <nanobind/stl/variant.h>
 
 #include <limits>
 #include <map>
@@ -323,6 +324,11 @@ void bind_controller(nanobind::module_& m) {
            "The mounts were checked: ends the HOLD that monitor.await_mounts begins with.")
       .def("reset", &Controller::reset,
            "Leaves STOP, only once its cause is gone; True where it did.")
+      .def("retune", &Controller::retune, "tasks"_a,
+           "Other values for the same tasks in the same order, from the next tick on; what was "
+           "seen and commanded, and the mode, stay.\n\n"
+           "Raises:\n    ConfigError: other tasks or another order, a value out of bounds; nothing "
+           "is changed then.")
       .def_prop_ro(
           "robot", [](const Controller& c) -> const Robot& { return c.robot(); },
           nb::rv_policy::reference_internal)

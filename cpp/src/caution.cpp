@@ -28,7 +28,12 @@ Caution::Caution(const Robot& robot, const Skin& skin, const ControllerConfig& c
       config_(config.monitor),
       whole_body_(config.control_point == ControlPoint::kWholeBody),
       view_S_(view_directions(skin.model)) {
-  for (const TaskSpec& task : config.tasks) {
+  retune(config.tasks);
+}
+
+void Caution::retune(const std::vector<TaskSpec>& tasks) {
+  avoidance_.reset();
+  for (const TaskSpec& task : tasks) {
     const auto* spec = std::get_if<Avoidance>(&task);
     if (spec != nullptr && !avoidance_) avoidance_ = *spec;
   }

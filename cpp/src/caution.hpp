@@ -14,6 +14,9 @@ class Caution {
  public:
   Caution(const Robot& robot, const Skin& skin, const ControllerConfig& config);
 
+  /// The tasks' values have changed.
+  void retune(const std::vector<TaskSpec>& tasks);
+
   /// Sets `trusted_distance` of a pair of known points: negative where its obstacle is inside.
   void trust_known(const Posture& posture, TickOutput& out);
   /// The same of sensed points. Where a scan is no longer fresh the distances of its points are

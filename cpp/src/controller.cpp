@@ -346,5 +346,24 @@ bool Controller::reset() {
   if (left) impl_->history.go_on();
   return left;
 }
+void Controller::retune(const std::vector<TaskSpec>& tasks) {
+  std::vector<TaskSpec>& mine = impl_->config.tasks;
+  const bool same =
+      std::equal(tasks.begin(), tasks.end(), mine.begin(), mine.end(),
+                 [](const TaskSpec& a, const TaskSpec& b) { return a.index() == b.index(); });
+  if (!same) {
+    std::string names;
+    for (const TaskSpec& task : mine)
+      names += std::string(names.empty() ? "" : ", ") + task_name(task);
+    throw ConfigError("tasks: other values are taken for the same tasks in the same order: " +
+                      names);
+  }
+  ControllerConfig changed = impl_->config;
+  changed.tasks = tasks;
+  changed.validate();
+  for (const TaskSpec& task : tasks) proxcgal::validate(task, *impl_->robot);
+  mine = tasks;
+  impl_->caution.retune(tasks);
+}
 
 }  // namespace proxcgal

@@ -165,6 +165,10 @@ class Controller {
   /// The sensors sit where the skin says: ends the HOLD of `monitor.await_mounts`. For whoever has
   /// compared what they see of the arm itself with what they must see.
   void accept_mounts();
+  /// Other values for the same tasks in the same order, from the next tick on; what was seen, what
+  /// was commanded and the mode stay. Not part of the tick: it may throw, and changes nothing then.
+  /// @throws ConfigError  other tasks or another order, a value out of bounds
+  void retune(const std::vector<TaskSpec>& tasks);
 
  private:
   struct Impl;

@@ -71,7 +71,7 @@ class Setup:
         motion = {k: v for k, v in _keys(settings.motion).items() if k != "controllers"}
         config = _core.ControllerConfig(
             control_point="sensor" if controller == "sm" else "whole_body",
-            tasks=[_task(name, settings) for name in settings.tasks],
+            tasks=self.make_tasks(),
             filter=_core.FilterConfig(**_keys(settings.filter)),
             solver=_core.SolverConfig(**_keys(settings.solver)),
             monitor=_core.MonitorConfig(**_keys(settings.monitor)),
@@ -84,6 +84,11 @@ class Setup:
             motion=_core.MotionConfig(**motion) if tracks else None,
         )
         return _core.Controller(self.robot, self.skin, config)
+
+    def make_tasks(self) -> list[Any]:
+        """The scenario's tasks, in order of priority."""
+        settings = self.scenario.controller
+        return [_task(name, settings) for name in settings.tasks]
 
     def mesh_hashes(self) -> dict[str, str]:
         """SHA-256 of each link's meshes, as `LINK full` and `LINK control`."""

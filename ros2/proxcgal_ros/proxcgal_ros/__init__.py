@@ -1,0 +1,1 @@
+"""proxcgal as ROS 2 nodes."""

@@ -1,0 +1,178 @@
+"""Goals for the arm that the node controls."""
+
+from __future__ import annotations
+
+import math
+from collections import OrderedDict
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxcgal import _core
+from proxcgal.models import Robot
+from proxcgal.sim.ticks import TickInput, TickResult
+from proxcgal_ros.goals import (
+    BASE,
+    Feedback,
+    Goal,
+    GoalRefusedError,
+    Outcome,
+    Result,
+    goal_pose,
+    goal_problems,
+    pose_errors,
+    reach_problem,
+)
+
+Array = NDArray[np.float64]
+
+AT_REST = 1e-3  # [rad/s] of every joint
+STOPPED_AFTER = 3.0  # [s] a cancelled goal has ended, whatever avoidance still moves
+HELD_OFF = 0.5  # activation of avoidance at which an obstacle is why a goal was not reached
+KEPT_RESULTS = 1000  # the oldest are forgotten
+_STOP = int(_core.Mode.STOP.value)
+
+
+@dataclass(slots=True)
+class Rules:
+    """When a goal ends; may change between ticks."""
+
+    position_tolerance: float = 0.03  #: [m]
+    angle_tolerance: float = 0.05  #: [rad]
+    timeout: float = 60.0  #: [s]
+    preempt: bool = True  #: a goal replaces the one that is pursued; else it is refused
+
+
+@dataclass(slots=True)
+class _Active:
+    number: int
+    T_WT: Array
+    begun: float
+    state: str = "executing"
+    cancelled: float = math.inf  # [s] when
+
+
+class LiveGoals:
+    """Gives each tick its goal, and ends each goal exactly once.
+
+    Without one the arm is held where the last one ended.
+    """
+
+    def __init__(self, robot: Robot, base_frame: str, rules: Rules) -> None:
+        """Args: the frame that its base is called by, beside the thesis's name."""
+        self._robot = robot
+        self._base_frames = (BASE, base_frame)
+        self.rules = rules
+        self._count = 0
+        self._active: _Active | None = None
+        self._results: OrderedDict[int, Result] = OrderedDict()
+        self._held: Array | None = None
+        self._tool: Array | None = None
+        self._q: Array | None = None
+        self._time = 0.0
+        self._last: TickResult | None = None
+
+    def send_goal(self, goal: Goal) -> int:
+        """Its number. Raises: GoalRefusedError with every reason."""
+        problems = goal_problems(goal, self._base_frames)
+        if goal.init:
+            problems.append(
+                f"init_config_name = {goal.init!r}: a real arm is not put anywhere; leave it empty"
+            )
+        if self._tool is None:
+            problems.append("no joint states yet")
+        if self._last is not None and self._last.mode == _STOP:
+            problems.append("the monitor has stopped the arm; it takes goals again after a reset")
+        if not self.rules.preempt and self._active is not None:
+            problems.append(f"goal {self._active.number} is being pursued")
+        if not problems and self._tool is not None:
+            T_WT = goal_pose(goal, self._tool)
+            far = reach_problem(self._robot, T_WT)
+            if far is None:
+                self._count += 1
+                if self._active is not None:
+                    self._end("cancelled", f"preempted by goal {self._count}")
+                self._active = _Active(self._count, T_WT, self._time)
+                return self._count
+            problems.append(far)
+        raise GoalRefusedError("\n".join(problems))
+
+    def cancel(self, number: int) -> bool:
+        """Brakes within limits; the goal has ended once the arm rests. False: it had ended."""
+        active = self._active
+        if active is None or active.number != number or active.state == "cancelling":
+            return False
+        active.state, active.cancelled = "cancelling", self._time
+        return True
+
+    def feedback(self, number: int) -> Feedback | None:
+        """How it is doing; None where it is not pursued."""
+        active = self._active
+        if active is None or active.number != number or self._tool is None or self._q is None:
+            return None
+        qd = np.zeros_like(self._q) if self._last is None else self._last.qd
+        velocity = np.asarray(self._robot.tool_jacobian(self._q)) @ qd
+        return Feedback(
+            active.state, self._time - active.begun, float(np.linalg.norm(velocity[:3])),
+            float(np.linalg.norm(velocity[3:])), *pose_errors(self._tool, active.T_WT),
+        )  # fmt: skip
+
+    def result(self, number: int) -> Result | None:
+        """How it ended; None while it has not."""
+        return self._results.get(number)
+
+    def at(self, time: float, q: Array) -> Array:
+        """(4, 4) T_WT that the tick at this time is given, the arm being at q (n_q,)."""
+        self._time = time
+        if np.isfinite(q).all():
+            self._q, self._tool = q, np.asarray(self._robot.tool_pose(q))
+        if self._tool is None:  # not a number from the first: the tick says so
+            return np.eye(4)
+        active = self._active
+        if active is not None and active.state == "executing":
+            return active.T_WT
+        if self._held is None or active is not None:
+            self._held = self._tool  # nothing is asked of the tool: it comes to rest
+        return self._held
+
+    def after(self, given: TickInput, result: TickResult) -> None:
+        """Whether the goal has ended with this tick."""
+        self._last = result
+        active = self._active
+        if active is None or self._tool is None:
+            return
+        errors = pose_errors(self._tool, active.T_WT)
+        if result.mode == _STOP:
+            reasons = ", ".join(sorted({found.reason for found in result.findings}))
+            self._end("aborted", f"the monitor stopped the arm: {reasons}")
+        elif active.state == "cancelling":
+            resting = bool(np.abs(result.qd).max() <= AT_REST)
+            if resting or self._time - active.cancelled > STOPPED_AFTER:
+                self._end("cancelled", "cancelled by the client")
+        elif errors[0] <= self.rules.position_tolerance and errors[1] <= self.rules.angle_tolerance:
+            self._end("succeeded", "the tool is at the goal")
+            self._held = active.T_WT
+        elif given.time - active.begun > self.rules.timeout:
+            near = f" held off by the obstacle, {result.seen:.3f} m away"
+            why = near if result.activation() > HELD_OFF else ""
+            self._end("aborted", f"not reached within {self.rules.timeout:g} s{why and ':'}{why}")
+
+    def close(self) -> None:
+        """The node ends."""
+        if self._active is not None:
+            self._end("aborted", "the node was shut down")
+
+    def _end(self, outcome: Outcome, reason: str) -> None:
+        """The one place where a goal ends."""
+        active = self._active
+        assert active is not None
+        assert self._tool is not None
+        assert active.number not in self._results
+        self._held = self._tool
+        self._results[active.number] = Result(
+            outcome, reason, self._time - active.begun, *pose_errors(self._tool, active.T_WT)
+        )
+        while len(self._results) > KEPT_RESULTS:
+            self._results.popitem(last=False)
+        self._active = None

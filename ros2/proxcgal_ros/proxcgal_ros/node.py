@@ -1,0 +1,219 @@
+"""The controller as a node: joint states and scans in, joint velocities out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped
+from proxcgal_msgs.msg import Proximity
+from rclpy.executors import Executor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import PointCloud2
+from std_srvs.srv import Trigger
+from visualization_msgs.msg import MarkerArray
+
+from proxcgal.errors import ConfigError
+from proxcgal.sim.loop import run_ticks
+from proxcgal.sim.recorder import Recorder, Settings
+from proxcgal.sim.scenario import CONTROLLERS, change_scenario, load_scenario
+from proxcgal.sim.setup import Setup
+from proxcgal.sim.ticks import Tick, TickInput, TickResult, TickTruth
+from proxcgal_ros import parameters, topics
+from proxcgal_ros.action import MoveRobotAction
+from proxcgal_ros.clocks import Clocks
+from proxcgal_ros.convert import cloud_message, header, pose_message, proximity_message
+from proxcgal_ros.display import Views, diagnostics, markers, pair_marker
+from proxcgal_ros.live_goals import LiveGoals, Rules
+from proxcgal_ros.source import RosSource
+
+LIVE_CONTROLLERS = tuple(name for name in CONTROLLERS if name != "wb_known")
+VIEWS_HZ = 2.0  # fields of view are many lines
+PATIENCE = 1.25  # of the clouds' period
+EARLY = 0.75  # of a display's period: what comes at its rate, but not evenly, is not left out
+
+
+class ControllerNode(Node):
+    """One controller between the topics. Raises: ProxError, a line for all that does not fit."""
+
+    def __init__(self, executor: Executor, running: Callable[[], bool]) -> None:
+        """Reads the parameters, loads robot and skin, subscribes and publishes.
+
+        Args:
+            executor: that it will be spun by.
+            running: false once it is to end.
+        """
+        super().__init__("proxcgal")
+        name = parameters.fixed_text(
+            self, "scenario", "front_plane",
+            "robot, skin and controller: a built-in scenario's name or a path",
+        )  # fmt: skip
+        changes = parameters.fixed_texts(self, "set", "KEY=VALUE on the scenario")
+        controller = parameters.fixed_text(self, "controller", "wb", " or ".join(LIVE_CONTROLLERS))
+        if controller not in LIVE_CONTROLLERS:
+            raise ConfigError(
+                f"parameter controller = {controller!r}: must be {' or '.join(LIVE_CONTROLLERS)}"
+            )
+        self._name = controller
+        setup = Setup.of(load_scenario(name, changes))
+        values = setup.scenario.controller.model_dump()
+        numbers = parameters.declare_numbers(self, values)
+        second = parameters.declare_second_goal(self)
+        self.setup = self._tuned(setup, numbers)
+        self.law = self.setup.make_controller(controller)
+        frame = parameters.fixed_text(self, "frame_id", "", "of the robot's base; empty: its name")
+        self._frame = frame or topics.base_frame(setup.robot)
+        self._hz = {key: numbers[key] for key in ("cloud_hz", "diagnostics_hz")}
+        self._rules = Rules(
+            numbers["position_tolerance"], numbers["angle_tolerance"], numbers["goal_timeout"],
+            second == "preempt",
+        )  # fmt: skip
+        self._clocks = Clocks(self)
+        self.goals = LiveGoals(setup.robot, self._frame, self._rules)
+        self.source = RosSource(self, executor, self.setup, self._clocks, self.goals, running)
+        self._views = Views(setup.robot, setup.skin)
+        self._sensors = [mount.name for mount in setup.skin.mounts]
+        self._shown = {"cloud_hz": -np.inf, "diagnostics_hz": -np.inf, "views": -np.inf}
+        self._cloud_ns = 0  # stamp of the last cloud
+        self._goal_told: object = None
+        out = topics.RELIABLE_QOS
+        keep = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self._proximity = self.create_publisher(Proximity, topics.PROXIMITY, out)
+        self._cloud = self.create_publisher(PointCloud2, topics.CLOUD, out)
+        self._markers = self.create_publisher(MarkerArray, topics.MARKERS, out)
+        self._diagnostics = self.create_publisher(DiagnosticArray, topics.DIAGNOSTICS, out)
+        self._goal = self.create_publisher(PoseStamped, topics.GOAL, keep)
+        self.create_timer(0.5, self._tell_waiting)
+        self._last: TickResult | None = None
+        self._action = MoveRobotAction(self, self.goals)
+        if parameters.fixed_switch(self, "reset_service", "offer ~/reset, which leaves a STOP"):
+            self.create_service(Trigger, "~/reset", self._reset)
+        record = parameters.fixed_text(self, "record", "", "MCAP file for every tick; empty: none")
+        self._recorder = Recorder(Path(record)) if record else None
+        parameters.on_change(self, self._change)
+        self.get_logger().info(
+            f"{setup.robot.name}, {len(setup.skin)} sensors, controller {controller}; waiting for "
+            f"{', '.join(self.setup.robot.joint_names)} on {topics.JOINT_STATES}"
+        )
+
+    def run(self) -> None:
+        """Tick after tick until the node is to end; then the arm is told to rest."""
+        if self._recorder is not None:
+            self._recorder.start(
+                Settings(
+                    scenario=self.setup.scenario, controller=self._name,
+                    seed=self.setup.scenario.seed, meshes=self.setup.mesh_hashes(),
+                )
+            )  # fmt: skip
+        mode = 0
+        try:
+            for given, result in run_ticks(self.source, self.law):
+                self._last = result
+                self.goals.after(given, result)
+                self._show(given, result)
+                if self._recorder is not None:
+                    self._recorder.write(Tick(given, result, TickTruth()))
+                if result.mode != mode:
+                    self._tell_mode(mode, result)
+                    mode = result.mode
+        finally:
+            self.goals.close()
+            self._action.poll()
+            if self._recorder is not None:
+                self._recorder.close()
+
+    def _show(self, given: TickInput, result: TickResult) -> None:
+        """After the command has gone out: what others look at."""
+        head = header(self.source.q_stamp_ns, self._frame)
+        self._proximity.publish(proximity_message(result, head))
+        if self._cloud_due(given.time):
+            self._cloud_ns = max(self.source.scan_stamps_ns.values())
+            seen = header(self._cloud_ns, self._frame)
+            origins = np.asarray(self.law.cloud_origins())
+            self._cloud.publish(cloud_message(np.asarray(self.law.cloud_W()), origins, seen))
+            if self._markers.get_subscription_count():
+                shown = [pair_marker(result, head)]
+                if self._turn("views", given.time, VIEWS_HZ):
+                    shown.append(self._views.marker(given.q, head))
+                self._markers.publish(markers(*shown))
+        if self._turn("diagnostics_hz", given.time, self._hz["diagnostics_hz"]):
+            self._diagnose(given.time)
+        if given.goal is not self._goal_told:
+            self._goal_told = given.goal
+            self._goal.publish(pose_message(given.goal, head))
+
+    def _cloud_due(self, time: float) -> bool:
+        """Once all arrays have told something new; where one does not, it is not waited for."""
+        new = [stamp > self._cloud_ns for stamp in self.source.scan_stamps_ns.values()]
+        hz = self._hz["cloud_hz"]
+        patient = time - self._shown["cloud_hz"] < PATIENCE / hz
+        if not any(new) or (patient and not all(new)):
+            return False
+        return self._turn("cloud_hz", time, hz)
+
+    def _turn(self, what: str, time: float, hz: float) -> bool:
+        """Is it time for this display again?"""
+        if time - self._shown[what] < EARLY / hz:
+            return False
+        self._shown[what] = time
+        return True
+
+    def _diagnose(self, time: float) -> None:
+        monitor = self.setup.scenario.controller.monitor
+        self._diagnostics.publish(
+            diagnostics(
+                self.get_name(), self.setup.robot.name, self._last, self._sensors,
+                self.law.scan_ages(time), monitor.degraded_after, monitor.hold_after,
+                header(self._clocks.now_ns(), ""),
+            )
+        )  # fmt: skip
+
+    def _tell_waiting(self) -> None:
+        """Diagnostics before the first joint state."""
+        if self._last is None:
+            self._diagnose(self._clocks.now())
+
+    def _tell_mode(self, before: int, result: TickResult) -> None:
+        names = ("RUN", "DEGRADED", "HOLD", "STOP")
+        reasons = ", ".join(sorted({found.reason for found in result.findings}))
+        told = f"{names[before]} -> {names[result.mode]}" + (f": {reasons}" if reasons else "")
+        log = self.get_logger()
+        if result.mode >= 2:
+            log.warning(told)
+        else:
+            log.info(told)
+
+    def _reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        del request
+        response.success = bool(self.law.reset())
+        response.message = "left STOP" if response.success else "not stopped, or its cause lasts"
+        return response
+
+    def _tuned(self, setup: Setup, numbers: dict[str, float]) -> Setup:
+        """The set-up with the tuning parameters as its scenario's own."""
+        changes = [
+            f"controller.{key}={value!r}" for key, value in numbers.items()
+            if key in parameters.TUNING
+        ]  # fmt: skip
+        return replace(setup, scenario=change_scenario(setup.scenario, "parameters", changes))
+
+    def _change(self, changed: dict[str, object]) -> None:
+        """Takes on parameters. Raises: ConfigError, and nothing is changed then."""
+        numbers = {key: value for key, value in changed.items() if isinstance(value, float)}
+        tuning = {key: value for key, value in numbers.items() if key in parameters.TUNING}
+        if tuning:
+            setup = self._tuned(self.setup, tuning)
+            self.law.retune(setup.make_tasks())
+            self.setup = setup
+        for key in self._hz:
+            self._hz[key] = numbers.get(key, self._hz[key])
+        rules = self._rules
+        rules.position_tolerance = numbers.get("position_tolerance", rules.position_tolerance)
+        rules.angle_tolerance = numbers.get("angle_tolerance", rules.angle_tolerance)
+        rules.timeout = numbers.get("goal_timeout", rules.timeout)
+        if "second_goal" in changed:
+            rules.preempt = changed["second_goal"] == "preempt"

@@ -1,0 +1,153 @@
+"""Where the node's ticks come from: messages, and a watchdog where none come."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from proxcgal_msgs.msg import SensorArray
+from rclpy.executors import Executor
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+
+from proxcgal import _core
+from proxcgal.sim.setup import Setup
+from proxcgal.sim.ticks import TickInput
+from proxcgal_ros import topics
+from proxcgal_ros.clocks import Clocks
+from proxcgal_ros.convert import command_message, joint_positions, nanoseconds, scans_of
+from proxcgal_ros.live_goals import LiveGoals
+from proxcgal_ros.restarts import Restarts
+
+Array = NDArray[np.float64]
+
+JITTER = 0.25  # of a period: a joint state may come that much early and still make a tick
+OVERDUE = 1.5  # periods without a joint state, after which the watchdog makes the tick
+STEADY = 10  # joint states in a row that were not stale, before the first tick
+BACKLOG = 50  # events that are looked through for one
+KEPT_SCANS = 4  # of each sensor between two ticks; more are an attack or a fault
+
+
+class RosSource:
+    """Every joint state makes a tick, at the controller's rate; commands go out at once.
+
+    Where no joint state comes the watchdog makes the ticks, so that the monitor finds it stale.
+    """
+
+    def __init__(
+        self, node: Node, executor: Executor, setup: Setup, clocks: Clocks, goals: LiveGoals,
+        running: Callable[[], bool],
+    ) -> None:  # fmt: skip
+        """Subscribes and publishes.
+
+        Args:
+            node: whose the topics are.
+            executor: that it is spun by.
+            setup: robot and skin.
+            clocks: ROS time to the controller's.
+            goals: gives each tick its goal.
+            running: false once the node is to end.
+        """
+        self._node, self._executor, self._running = node, executor, running
+        self._clocks, self._goals = clocks, goals
+        self._names = list(setup.robot.joint_names)
+        self._period = 1.0 / setup.scenario.simulation.control_hz
+        self._scans: deque[_core.Scan] = deque(maxlen=KEPT_SCANS * max(len(setup.skin), 1))
+        self._restarts = Restarts(setup.scenario.controller.monitor.hold_after)
+        self._q: Array | None = None
+        self._q_stamp = -np.inf
+        self._steady = 0
+        self._stale = setup.scenario.controller.monitor.joints_hold_after
+        self.q_stamp_ns = 0  #: of the last joint state, ROS time
+        #: of the newest scan of each array that a tick was given, ROS time
+        self.scan_stamps_ns: dict[str, int] = {}
+        self.qd: Array = np.zeros(len(self._names))  #: last command
+        self._newest_ns: dict[str, int] = {}
+        self._fresh = False  # a joint state that no tick has been given
+        self._due = -np.inf
+        self._last = -np.inf
+        self._warned = False
+        node.create_subscription(
+            JointState, topics.JOINT_STATES, self._take_joints, topics.NEWEST_QOS
+        )
+        for name, rows in topics.arrays([mount.name for mount in setup.skin.mounts]).items():
+            node.create_subscription(
+                SensorArray, topics.scan_topic(name), self._taker(name, rows), topics.SENSOR_QOS
+            )
+        self._commands = node.create_publisher(
+            Float64MultiArray, topics.COMMANDS, topics.RELIABLE_QOS
+        )
+        node.create_timer(self._period / 2.0, self._watch)
+        self._overdue = False
+
+    def read(self) -> TickInput | None:
+        """The next tick's inputs, as soon as it is due; None once the node is to end."""
+        while self._running():
+            self._executor.spin_once(timeout_sec=0.1)
+            if self._q is None or self._steady < STEADY:
+                continue
+            if self._overdue:
+                self._catch_up()
+            now = self._clocks.now()
+            if (self._fresh and now >= self._due - JITTER * self._period) or self._overdue:
+                return self._input(now)
+        return None
+
+    def command(self, qd: Array) -> None:
+        """Joint velocities (n_q,) until the next tick."""
+        self.qd = qd
+        self._commands.publish(command_message(qd))
+
+    def stop(self) -> None:
+        """The last command: at rest."""
+        self.command(np.zeros(len(self._names)))
+
+    def _input(self, now: float) -> TickInput:
+        assert self._q is not None
+        late = self._last > -np.inf and now - self._last > 2.0 * self._period and self._fresh
+        self._due = max(self._due + self._period, now + (1.0 - JITTER) * self._period)
+        self._last, self._fresh, self._overdue = now, False, False
+        scans, self._scans = tuple(self._scans), deque(maxlen=self._scans.maxlen)
+        self.scan_stamps_ns = dict(self._newest_ns)
+        goal = self._goals.at(now, self._q)
+        return TickInput(now, self._q, goal, scans, late=late, q_stamp=self._q_stamp)
+
+    def _take_joints(self, message: JointState) -> None:
+        q = joint_positions(message, self._names)
+        if q is None:
+            if not self._warned:
+                self._warned = True
+                self._node.get_logger().warning(
+                    f"{topics.JOINT_STATES}: a message without some of {', '.join(self._names)}; "
+                    "such messages are left alone"
+                )
+            return
+        self.q_stamp_ns = nanoseconds(message.header.stamp) or self._clocks.now_ns()
+        stamp = self._clocks.carried(self.q_stamp_ns)
+        if self._steady < STEADY:  # while a driver starts nothing is latched
+            self._steady = self._steady + 1 if stamp - self._q_stamp < self._stale else 0
+        self._q, self._q_stamp = q, stamp
+        self._fresh = True
+
+    def _taker(self, name: str, rows: list[int]) -> Callable[[SensorArray], None]:
+        def take(message: SensorArray) -> None:
+            now = self._clocks.now()
+            self._scans.extend(scans_of(message, rows, self._clocks.carried, now, self._restarts))
+            stamps = [nanoseconds(scan.stamp) for scan in message.scans[: len(rows)]]
+            self._newest_ns[name] = max([self._newest_ns.get(name, 0), *stamps])
+
+        return take
+
+    def _watch(self) -> None:
+        """Makes a tick due where joint states stay away."""
+        self._overdue = self._clocks.now() - self._last > OVERDUE * self._period
+
+    def _catch_up(self) -> None:
+        """Perhaps it was this process that stood still: what has come meanwhile goes first."""
+        for _ in range(BACKLOG):
+            if self._fresh:
+                return
+            self._executor.spin_once(timeout_sec=0.0)

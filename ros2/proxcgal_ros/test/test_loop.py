@@ -1,0 +1,58 @@
+"""The whole loop over ROS 2: what it does to the experiment of front_plane."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from proxcgal_msgs.msg import Proximity
+
+from conftest import PATIENT, Client, Processes, goal
+from proxcgal.sim.scenario import load_scenario
+from proxcgal.sim.setup import Setup
+from proxcgal.sim.trial import run_trial
+
+SCENE = "front_plane"
+
+
+@pytest.fixture
+def setup() -> Setup:
+    return Setup.of(load_scenario(SCENE))
+
+
+def over_ros(
+    controller: str, setup: Setup, folder: Path, processes: Processes, client: Client
+) -> dict[str, float]:
+    """The scene's summary, its goal sent as one of MoveRobot."""
+    out = folder / f"{controller}.json"
+    node, sim = f"node_{controller}", f"sim_{controller}"
+    processes.start(node, "node", *PATIENT, "-p", f"controller:={controller}")
+    arm = processes.start(sim, "sim", SCENE, "--out", str(out))
+    heard = client.listen(Proximity, "proximity")
+    heard.clear()
+    assert client.until(lambda: heard and heard[-1][1].mode == Proximity.RUN, 40.0)
+    x, y, z = setup.goal[:3, 3].tolist()
+    handle = client.send(goal(x, y, z, frame="kuka_base"))
+    assert handle.accepted
+    assert client.until(lambda: arm.poll() is not None, 60.0)
+    assert (processes.end(sim), processes.end(node)) == (0, 0)
+    told: dict[str, float] = json.loads(out.read_text())
+    return told
+
+
+def test_front_plane_over_ros_keeps_the_gain_of_the_direct_loop(
+    setup: Setup, tmp_path: Path, processes: Processes, client: Client
+) -> None:
+    names = ("wb", "sm")
+    direct = {
+        name: run_trial(setup.scenario, name, robot=setup.robot, sparse_truth=True).summary()
+        for name in names
+    }
+    ros = {name: over_ros(name, setup, tmp_path, processes, client) for name in names}
+    gains = [
+        1000.0 * (told["wb"]["true_final_m"] - told["sm"]["true_final_m"]) for told in (direct, ros)
+    ]
+    print(f"gain: direct {gains[0]:.1f} mm, over ROS 2 {gains[1]:.1f} mm")
+    print({name: told["true_min_m"] for name, told in ros.items()})
+    assert gains[1] == pytest.approx(gains[0], abs=20.0)
