@@ -41,7 +41,7 @@ def _parts(kind: Kind, stored: StoredCampaign) -> Iterator[str]:
     for sentence in kind.verdicts(summary):
         yield f"<p>{escape(sentence)}</p>"
     for listing in kind.listings(summary):
-        yield from _listing(listing)
+        yield from listing_part(listing)
     budget = PICTURE_BYTES
     for name, caption in kind.captions(summary).items():
         part, used = picture(stored.folder / Path(name).name, caption, budget)
@@ -51,7 +51,8 @@ def _parts(kind: Kind, stored: StoredCampaign) -> Iterator[str]:
     yield from origin_part(stored.about)
 
 
-def _listing(listing: Listing) -> Iterator[str]:
+def listing_part(listing: Listing) -> Iterator[str]:
+    """A table as HTML."""
     yield f'<div class="scroll"><table><caption>{escape(listing.caption)}</caption><thead><tr>'
     for column, (name, unit) in enumerate(zip(listing.names, listing.units, strict=True)):
         side = ' class="left"' if column < listing.left else ""

@@ -24,6 +24,7 @@ usage: proxcgal COMMAND ...
   campaign KIND  many trials, on this machine or on a cluster, and what they amount to
   coverage SCENARIO   what the sensors see of the space round the arm
   sweep          time both algorithms, literal and accelerated, over meshes and clouds
+  serve          take goals for the 12-joint robot over TCP, one JSON object a line
   replay FILE    step through a recording
   report DIR     write DIR/report.html from the results in DIR
   scenarios      the scenes there are
@@ -48,6 +49,7 @@ COMMANDS = {
     "campaign": "proxcgal.apps.campaign",
     "coverage": "proxcgal.apps.coverage",
     "sweep": "proxcgal.apps.sweep",
+    "serve": "proxcgal.apps.serve",
     "replay": "proxcgal.apps.replay",
     "report": "proxcgal.apps.report",
     "scenarios": "proxcgal.apps.lists",

@@ -44,14 +44,17 @@ def write_report(folder: Path) -> Path:
         ConfigError: no such folder, no `summary.json` in it, or files that cannot be read.
     """
     from proxcgal.apps.campaign_page import campaign_page
+    from proxcgal.apps.joint_page import joint_page
     from proxcgal.apps.page import page
-    from proxcgal.apps.stored import read_campaign, read_runs, read_sweep
+    from proxcgal.apps.stored import read_campaign, read_joint, read_runs, read_sweep
     from proxcgal.apps.sweep_page import sweep_page
 
     if sweep := read_sweep(folder):
         text = sweep_page(sweep)
     elif campaign := read_campaign(folder):
         text = campaign_page(campaign)
+    elif joint := read_joint(folder):
+        text = joint_page(joint)
     else:
         text = page(*read_runs(folder))
     path = folder / "report.html"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field, ValidationError
 
@@ -25,6 +25,9 @@ from proxcgal.sim.scenario_keys import (
 from proxcgal.sim.scenario_law import Controller
 from proxcgal.sim.scenario_problems import lines
 from proxcgal.sim.scene import ObstacleScene, Scene
+
+if TYPE_CHECKING:
+    from proxcgal.sim.scenario_joint import Finish
 
 #: wb: whole body; sm: sensor points; wb_known: whole body on points of the scene itself; wb_memory:
 #: whole body that remembers what left the sensors' view.
@@ -64,13 +67,28 @@ class Scenario(Section):
         """What stands and moves beside the robot."""
         return ObstacleScene(self.obstacles)
 
+    def start(self) -> tuple[str, tuple[float, ...]]:
+        """Joint positions at 0 s, and the key that gives them."""
+        return "q0", self.q0
+
+    def controllers(self) -> tuple[str, ...]:
+        """Those of a run that names none."""
+        return USUAL
+
+    def ends(self) -> Finish | None:
+        """When a run is over before its time; None: never."""
+        return None
+
     def to_toml(self) -> str:
         """The file that gives this scenario again, with every default written out."""
         return toml.write(self.model_dump(by_alias=True))
 
 
-#: The class of each `kind`.
-KINDS: dict[str, type[Scenario]] = {"static": Scenario}
+def kinds() -> dict[str, type[Scenario]]:
+    """The class of each `kind`."""
+    from proxcgal.sim.scenario_joint import JointScenario  # which is made from Scenario
+
+    return {"static": Scenario, "joint": JointScenario}
 
 
 def list_scenarios() -> dict[str, str]:
@@ -122,7 +140,7 @@ def _checked(table: dict[str, Any], origin: str, overrides: Sequence[str]) -> Sc
     for assignment in overrides:
         toml.override(table, assignment)
     kind = table.get("kind", "static")
-    model = KINDS.get(kind, Scenario) if isinstance(kind, str) else Scenario
+    model = kinds().get(kind, Scenario) if isinstance(kind, str) else Scenario
     try:
         return model.model_validate(_tuples(table))
     except ValidationError as error:
