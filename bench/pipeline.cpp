@@ -17,6 +17,7 @@ namespace {
 
 constexpr double kTickBudget = 150.0, kLargeBudget = 5000.0, kWorstBudget = 66'700.0;  // [us]
 constexpr double kMemoryBudget = 100.0;                                                // [us] more
+constexpr double kJointBudget = 400.0;                                                 // [us]
 constexpr int kTicks = 5000;
 constexpr double kSway = 0.05;  // [rad]
 
@@ -125,10 +126,11 @@ void add_stages(const Cell& cell) {
 
 /// Each tick gets a new scan of every sensor, with noise of its own, while the arm sways: the most
 /// that there can be to do.
-void add_tick(const Cell& cell, const char* name, const std::vector<TaskSpec>& tasks) {
+void add_tick(const Cell& cell, const char* name, const std::vector<TaskSpec>& tasks,
+              double budget_us) {
   const std::size_t sensors = cell.skin.mounts.size();
   add(named(name, cell, static_cast<Eigen::Index>(sensors) * kZones), kTicks,
-      [&cell, tasks, sensors](benchmark::State& state) {
+      [&cell, tasks, sensors, budget_us](benchmark::State& state) {
         ControllerConfig config;
         config.tasks = tasks;
         Controller controller(cell.robot, cell.skin, config);
@@ -153,7 +155,7 @@ void add_tick(const Cell& cell, const char* name, const std::vector<TaskSpec>& t
                 controller.tick(time, q, std::span(scans).subspan(batch, sensors), cell.goal));
           });
         }
-        samples.report(state, tasks.size() > 2 ? 0.0 : kTickBudget);
+        samples.report(state, budget_us);
         state.counters["cloud"] = static_cast<double>(controller.cloud_W().rows());
       });
 }
@@ -211,6 +213,54 @@ void add_memory(const Cell& cell, std::size_t copies, std::uint32_t every) {
         state.counters["more_budget_us"] = kMemoryBudget;
         state.counters["remembered"] = static_cast<double>(remembered) / counter;
       });
+}
+
+/// The cylinder of the scene `joint_cylinder`, points 20 mm apart.
+Points cylinder() {
+  constexpr int kRound = 32, kUp = 76;
+  Points points_W(kRound * kUp, 3);
+  for (int i = 0; i < kRound * kUp; ++i) {
+    const double angle = 2.0 * M_PI * (i % kRound) / kRound;
+    points_W.row(i) << 2.6 + 0.1 * std::cos(angle), 0.25 + 0.1 * std::sin(angle),
+        0.02 * (i / kRound);  // NOLINT(bugprone-integer-division)
+  }
+  return points_W;
+}
+
+/// The same on points of the scene itself.
+void add_known_tick(const Cell& cell, const char* name, const std::vector<TaskSpec>& tasks,
+                    double budget_us) {
+  const Points points_W = cylinder();
+  add(named(name, cell, points_W.rows()), kTicks,
+      [&cell, tasks, points_W, budget_us](benchmark::State& state) {
+        ControllerConfig config;
+        config.tasks = tasks;
+        Controller controller(cell.robot, cell.skin, config);
+        JointVector q = cell.posture.q;
+        double time = 0.0;
+        Samples samples;
+        for (auto _ : state) {
+          time += config.period;
+          for (Eigen::Index j = 0; j < q.size(); ++j)
+            q[j] = cell.posture.q[j] + kSway * std::sin(2.0 * time + static_cast<double>(j));
+          samples.take(state, [&] {
+            benchmark::DoNotOptimize(controller.tick_known(time, q, points_W, cell.goal));
+          });
+        }
+        samples.report(state, budget_us);
+      });
+}
+
+/// The 12-joint robot's full stack: five levels with the closing one, six with self-collision.
+void add_joint_ticks(const Cell& cell) {
+  const Avoidance avoidance{.d_min = 0.05, .buffer = 0.15, .nearest = 3};
+  const std::vector<TaskSpec> full = {JointLimits{}, avoidance, MinimumAltitude{}, Reach{}};
+  const std::vector<TaskSpec> more = {JointLimits{}, SelfCollision{}, avoidance, MinimumAltitude{},
+                                      Reach{}};
+  add_tick(cell, "tick/joint_full", full, kJointBudget);
+  add_tick(cell, "tick/joint_self_collision", more, kJointBudget);
+  add_known_tick(cell, "tick/joint_full_known", full, kJointBudget);
+  add_known_tick(cell, "tick/joint_self_collision_known", more, kJointBudget);
 }
 
 /// Task rows, solver and command, from the pair on.
@@ -409,10 +459,15 @@ int main(int argc, char** argv) {
   }
   for (const Cell& cell : cells) {
     if (cell.scans.size() > cell.skin.mounts.size()) {  // many scans: for the ticks
-      add_tick(cell, "tick/scans", {Avoidance{}, Reach{}});
+      if (cell.robot->n_q() == 12) {
+        add_joint_ticks(cell);
+        continue;
+      }
+      add_tick(cell, "tick/scans", {Avoidance{}, Reach{}}, kTickBudget);
       add_tick(
           cell, "tick/five_tasks",
-          {JointLimits{}, Avoidance{.nearest = 3}, MinimumAltitude{}, Manipulability{}, Reach{}});
+          {JointLimits{}, Avoidance{.nearest = 3}, MinimumAltitude{}, Manipulability{}, Reach{}},
+          0.0);
       add_memory(cell, 1, 1);
       add_memory(cell, 1, 7);
       add_memory(cell, 100, 1);

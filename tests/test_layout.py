@@ -33,6 +33,7 @@ CPP_LAYER_OF = {
     "internal_clock": "controller",
     "tick_history": "controller",
     "control_points": "controller",
+    "own_pairs": "controller",
     "controller": "controller",
     "controller_config": "controller",
     "admittance": "controller",

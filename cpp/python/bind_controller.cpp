@@ -1,4 +1,5 @@
 #include <nanobind/stl/map.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/variant.h>
 
 #include <limits>
@@ -40,6 +41,8 @@ struct Output {
   std::optional<Vector3> control_W;
   double control_distance = kInfinity;
   std::string control_link;
+  std::optional<std::pair<std::string, std::string>> own_links;
+  double own_distance = kInfinity;
   double trusted_distance = kInfinity;
   Mode mode;
   std::vector<NamedFinding> findings;
@@ -81,6 +84,10 @@ Output kept(const Controller& controller, const TickOutput& out) {
   copy.control_distance = out.control.distance;
   copy.control_link = link_name(robot, out.control.link);
   copy.trusted_distance = out.trusted_distance;
+  if (out.own.a >= 0) {
+    copy.own_links.emplace(link_name(robot, out.own.a), link_name(robot, out.own.b));
+    copy.own_distance = out.own.distance;
+  }
   copy.mode = out.mode;
   for (const Finding& finding : controller.findings()) {
     copy.findings.push_back(named_finding(robot, finding));
@@ -248,6 +255,9 @@ void bind_output(nb::module_& m) {
       .def_ro("control_distance", &Output::control_distance,
               "[m] from that point to the obstacle; inf for none.")
       .def_ro("control_link", &Output::control_link, "Its link; empty for none.")
+      .def_ro("own_links", &Output::own_links,
+              "The two links that the first self-collision row parts; None where none is near.")
+      .def_ro("own_distance", &Output::own_distance, "[m] between them; inf for none.")
       .def_ro("trusted_distance", &Output::trusted_distance,
               "[m] the pair's, less the way that something may have come since its scan was fresh; "
               "negative where the obstacle is inside the surface; inf for none.")

@@ -1,3 +1,5 @@
+#include <nanobind/stl/pair.h>
+
 #include "convert.hpp"
 #include "proxcgal/pipeline/task.hpp"
 
@@ -82,19 +84,38 @@ void bind_task(nanobind::module_& m) {
       .def(
           "__init__",
           [](Manipulability* self, double target, double low, double high, double gain,
-             int first_joint, int joints) {
-            construct(self, {target, low, high, gain, first_joint, joints});
+             int first_joint, int joints, double unit) {
+            construct(self, {target, low, high, gain, first_joint, joints, unit});
           },
           nb::kw_only(), "target"_a = Manipulability{}.target, "low"_a = Manipulability{}.low,
           "high"_a = Manipulability{}.high, "gain"_a = Manipulability{}.gain,
           "first_joint"_a = Manipulability{}.first_joint, "joints"_a = Manipulability{}.joints,
-          raises)
+          "unit"_a = Manipulability{}.unit, raises)
       .def_rw("target", &Manipulability::target, "[-] the rate pulls towards it.")
       .def_rw("low", &Manipulability::low, "[-] fully active below.")
       .def_rw("high", &Manipulability::high, "[-] inactive above.")
       .def_rw("gain", &Manipulability::gain, "[1/s]")
       .def_rw("first_joint", &Manipulability::first_joint, "Of the arm that is meant.")
-      .def_rw("joints", &Manipulability::joints, "Of that arm; 0 takes all from first_joint on.");
+      .def_rw("joints", &Manipulability::joints, "Of that arm; 0 takes all from first_joint on.")
+      .def_rw("unit", &Manipulability::unit, "It is counted in this: 1, or the arm's maximum.");
+  nb::class_<SelfCollision>(m, "SelfCollision",
+                            "Keep links off one another, as avoidance does off obstacles.")
+      .def(
+          "__init__",
+          [](SelfCollision* self, double d_min, double buffer, double gain, int nearest,
+             const std::vector<std::pair<std::string, std::string>>& pairs) {
+            construct(self, {d_min, buffer, gain, nearest, pairs});
+          },
+          nb::kw_only(), "d_min"_a = SelfCollision{}.d_min, "buffer"_a = SelfCollision{}.buffer,
+          "gain"_a = SelfCollision{}.gain, "nearest"_a = SelfCollision{}.nearest,
+          "pairs"_a = SelfCollision{}.pairs, raises)
+      .def_rw("d_min", &SelfCollision::d_min, "[m] distance to keep.")
+      .def_rw("buffer", &SelfCollision::buffer, "[m] the activation rises from 0 to 1 inside it.")
+      .def_rw("gain", &SelfCollision::gain, "[1/s]")
+      .def_rw("nearest", &SelfCollision::nearest, "This many nearest pairs, one row each.")
+      .def_rw("pairs", &SelfCollision::pairs,
+              "Names of the links that are watched, two and two; empty: all that more than one "
+              "joint moves apart.");
   m.def("decreasing", &decreasing, "x"_a, "a"_a, "b"_a,
         "Bell of [iCAT]: 1 for x <= a, 0 for x >= b, a cosine between.");
   m.def("increasing", &increasing, "x"_a, "a"_a, "b"_a, "1 - decreasing.");

@@ -186,13 +186,21 @@ std::span<const ControlPair> ControlPoints::sensor(const Skin& skin, const Postu
 
 std::span<const ControlPair> ControlPoints::links(const Robot& robot, const Posture& posture,
                                                   const PointsRef& cloud_W, int count,
-                                                  const Velocities& velocities, Monitor& monitor) {
+                                                  double within, const Velocities& velocities,
+                                                  Monitor& monitor) {
   chosen_.clear();
-  closest_pairs(robot, posture, cloud_W, links_, per_link_, &steps_);
-  for (const ClosestPair& pair : per_link_) {
+  sorted_.clear();
+  for (std::size_t row = 0; row < links_.size(); ++row) {
+    const ClosestPair pair = closest_pair(robot, posture, cloud_W, method_,
+                                          {.links = std::span(&links_[row], 1),
+                                           .before = per_link_[row],
+                                           .within = within,
+                                           .steps = &steps_});
     if (pair.lower_bound) note(monitor, Reason::kWorkBounded, pair.link);
+    if (!pair.found()) continue;
+    per_link_[row] = pair;
+    sorted_.push_back(pair);
   }
-  sorted_.assign(per_link_.begin(), per_link_.end());
   std::sort(sorted_.begin(), sorted_.end(),
             [](const auto& x, const auto& y) { return x.distance < y.distance; });
   for (const ClosestPair& pair : sorted_) {

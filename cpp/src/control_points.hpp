@@ -35,8 +35,9 @@ class ControlPoints {
   std::span<const ControlPair> sensor(const Skin& skin, const Posture& posture,
                                       const PointsRef& cloud_W, const Velocities& velocities);
   /// The `count` nearest links that joints can move away, one pair each, nearest first.
+  /// @param within  [m] only nearer ones count: a row that is not active changes nothing
   std::span<const ControlPair> links(const Robot& robot, const Posture& posture,
-                                     const PointsRef& cloud_W, int count,
+                                     const PointsRef& cloud_W, int count, double within,
                                      const Velocities& velocities, Monitor& monitor);
   /// A pair that is known already.
   std::span<const ControlPair> one(const ControlPair& control);

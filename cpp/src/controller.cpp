@@ -7,6 +7,7 @@
 #include "caution.hpp"
 #include "control_points.hpp"
 #include "internal_clock.hpp"
+#include "own_pairs.hpp"
 #include "perception.hpp"
 #include "proxcgal/error.hpp"
 #include "stopwatch.hpp"
@@ -16,9 +17,10 @@
 namespace proxcgal {
 namespace {
 
-constexpr double kExecuted = 0.5;  // share of the demanded rate that counts as executed
-constexpr double kEngaged = 0.5;   // activation from which avoidance must be executed
-constexpr double kRigid = 1e-6;    // how far a goal's rotation may be from orthonormal
+constexpr double kExecuted = 0.5;     // share of the demanded rate that counts as executed
+constexpr double kEngaged = 0.5;      // activation from which avoidance must be executed
+constexpr double kJustBeyond = 1e-6;  // [m]
+constexpr double kRigid = 1e-6;       // how far a goal's rotation may be from orthonormal
 
 bool is_rigid(const Pose& T) {
   return T.matrix().allFinite() &&
@@ -35,6 +37,7 @@ struct Controller::Impl {
   Monitor monitor;
   detail::Perception perception;
   detail::ControlPoints control_points;
+  detail::OwnPairs own_pairs;
   detail::Caution caution;
   Limits limits;
   detail::InternalClock clock;
@@ -59,6 +62,7 @@ struct Controller::Impl {
         monitor(config.monitor),
         perception(robot, skin, config),
         control_points(*robot, skin, config),
+        own_pairs(*robot, config),
         caution(*robot, skin, config),
         limits{robot->q_min(), robot->q_max(), robot->qd_max(), robot->qdd_max()},
         clock(config.period),
@@ -100,12 +104,23 @@ struct Controller::Impl {
     if (config.control_point == ControlPoint::kSensor) {
       controls = control_points.sensor(skin, posture, cloud_W, velocities);
     } else if (spec.nearest > 1) {
-      controls = control_points.links(*robot, posture, cloud_W, spec.nearest, velocities, monitor);
+      // The nearest link is told even where nothing is active yet.
+      const double nearest =
+          out.pair_distance() < kInfinity ? out.pair_distance() + kJustBeyond : 0.0;
+      const double within = std::max(spec.d_min + spec.buffer, nearest);
+      controls =
+          control_points.links(*robot, posture, cloud_W, spec.nearest, within, velocities, monitor);
     } else if (out.pair) {
       controls = control_points.one(caution.control(out, velocities.of(out.pair->point)));
     }
     if (!controls.empty()) out.control = controls.front();
     build_avoidance(spec, *robot, posture, controls, task);
+  }
+
+  void build(const SelfCollision& spec, BuiltTask& task) {
+    const std::span<const LinkPair> pairs = own_pairs.nearest(spec, *robot, posture, monitor);
+    if (!pairs.empty()) out.own = pairs.front();
+    build_self_collision(spec, *robot, posture, pairs, task);
   }
 
   void build_stack(const PointsRef& cloud_W, const detail::Velocities& velocities,
@@ -125,9 +140,11 @@ struct Controller::Impl {
               build_minimum_altitude(spec, *robot, posture, task);
             if constexpr (std::is_same_v<Spec, Manipulability>)
               build_manipulability(spec, *robot, posture, task);
+            if constexpr (std::is_same_v<Spec, SelfCollision>) build(spec, task);
           },
           config.tasks[level]);
-      if (task.smallest_row_norm < kSmallRowNorm && task.task.activation.maxCoeff() > 0.0) {
+      const bool active = (task.task.activation.array() > 0.0).any();
+      if (task.smallest_row_norm < kSmallRowNorm && active) {
         note(Reason::kRowSmall);
       }
       stack[level] = task.task;
@@ -259,6 +276,7 @@ struct Controller::Impl {
     out.obstacle_velocity_W.setZero();
     out.trusted_distance = kInfinity;
     out.control = {};
+    out.own = {};
     out.timings = {};
     for (int level = 0; level < out.n_tasks; ++level)
       out.tasks[static_cast<std::size_t>(level)] = {};

@@ -57,8 +57,11 @@ ControllerConfig five_tasks() {
 }
 
 TEST(Controller, TickAllocatesNothing) {
+  ControllerConfig own = five_tasks();
+  own.tasks[3] = SelfCollision{.d_min = 0.3, .buffer = 0.3};  // so that there always is a pair
   for (const auto& config :
-       {ControllerConfig{}, five_tasks(), ControllerConfig{.control_point = ControlPoint::kSensor},
+       {ControllerConfig{}, five_tasks(), own,
+        ControllerConfig{.control_point = ControlPoint::kSensor},
         ControllerConfig{.memory = MemoryConfig{.max_points = 200}, .motion = MotionConfig{}}}) {
     const auto robot = test::arm();
     Controller controller(robot, test::ring(), config);
@@ -86,6 +89,35 @@ TEST(Controller, TickAllocatesNothing) {
 
 #if defined(__linux__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 /// A child that may only read, write and exit: whoever else calls the system is killed.
+TEST(Controller, SelfCollisionPartsTheNearestLinksThatJointsCanPart) {
+  const auto robot = test::arm();
+  ControllerConfig config;
+  config.tasks = {SelfCollision{.d_min = 0.1, .buffer = 0.3, .nearest = 2}};
+  Controller controller(robot, Skin{}, config);
+  JointVector q(6);
+  q << 0.0, 1.2, 2.6, 0.0, 0.4, 0.0;  // folded
+  Posture posture = robot->make_posture();
+  robot->update(q, posture);
+  double nearest = kInfinity;
+  for (int a = 0; a < robot->n_links(); ++a) {
+    for (int b = a + 3; b < robot->n_links(); ++b) {
+      const Pose T_AB = posture.T_WL[static_cast<std::size_t>(a)].inverse() *
+                        posture.T_WL[static_cast<std::size_t>(b)];
+      nearest = std::min(nearest, robot->tree(a).distance(robot->tree(b), T_AB));
+    }
+  }
+  double before = -1.0;
+  for (int i = 0; i < 30; ++i) {
+    const TickOutput& out = controller.tick_known(0.01 * i, q, Points(0, 3), posture.T_WT);
+    ASSERT_GE(out.own.a, 0);
+    EXPECT_LE(out.own.distance, nearest + 1e-12);
+    ASSERT_GE(out.tasks[0].rate.size(), 1);
+    ASSERT_LE(out.tasks[0].rate.size(), 2);
+    before = parting_row(*robot, posture, out.own).dot(out.qd);
+  }
+  EXPECT_GT(before, 0.0);
+}
+
 TEST(Controller, TickMakesNoSystemCall) {
   const auto robot = test::arm();
   Controller controller(robot, test::ring(), five_tasks());

@@ -218,5 +218,30 @@ TEST(MeshTree, RefusesWhatNoIndexCanBeBuiltFrom) {
   EXPECT_THROW(MeshTree(mesh.vertices, mesh.triangles.row(0) * 0), GeometryError);
 }
 
+TEST(MeshTree, ABoundedSearchBetweenSurfacesIsTheSameOrALowerBound) {
+  const MeshTree tree = bumpy();
+  const MeshTree other = bumpy();
+  Random random(13);
+  PairSearch search;
+  int cut = 0;
+  for (int i = 0; i < 200; ++i) {
+    Pose T = random.pose(1.0);
+    T.translation() = T.translation().normalized() * random.uniform(0.4, 0.9);
+    const double d = tree.distance(other, T);
+    search.steps = kSearchSteps;
+    Vector3 here, there;
+    EXPECT_EQ(tree.distance(other, T, kInfinity, &here, &there, &search), d);
+    EXPECT_FALSE(search.lower_bound);
+    EXPECT_LT(search.steps, kSearchSteps);
+    search.steps = 40;
+    const double bound = tree.distance(other, T, kInfinity, &here, &there, &search);
+    EXPECT_LE(bound, d + 1e-12);
+    const double points = (here - T * there).norm();
+    EXPECT_TRUE(std::isnan(points) || points >= d - 1e-9);
+    cut += search.lower_bound ? 1 : 0;
+  }
+  EXPECT_GT(cut, 100);
+}
+
 }  // namespace
 }  // namespace proxcgal

@@ -361,6 +361,50 @@ TEST(Manipulability, NeedsSixJoints) {
   EXPECT_NO_THROW(validate(TaskSpec{Manipulability{}}, arm(6)));
 }
 
+TEST(SelfCollision, RowIsTheDerivativeOfTheDistanceBetweenTwoPointsOfLinks) {
+  const Robot robot = arm(6);
+  Random random(11);
+  for (int i = 0; i < 30; ++i) {
+    const JointVector q = random_q(random, 6);
+    const Posture posture = at(robot, q);
+    const int a = robot.n_links() - 1;
+    const int b = 0;
+    const Vector3 on_a_L = random.vector(0.1);
+    const Vector3 on_b_L = random.vector(0.1);
+    const auto apart = [&](const Posture& p) {
+      return (p.T_WL[static_cast<std::size_t>(a)] * on_a_L -
+              p.T_WL[static_cast<std::size_t>(b)] * on_b_L)
+          .norm();
+    };
+    LinkPair pair{.a = a, .b = b};
+    pair.on_a_W = posture.T_WL[static_cast<std::size_t>(a)] * on_a_L;
+    pair.on_b_W = posture.T_WL[static_cast<std::size_t>(b)] * on_b_L;
+    pair.distance = apart(posture);
+    const SelfCollision spec{.d_min = pair.distance - 0.05, .buffer = 0.1};
+    BuiltTask built;
+    build_self_collision(spec, robot, posture, {&pair, 1}, built);
+    const RowVector slope = derivative(robot, q, apart);
+    EXPECT_LT((parting_row(robot, posture, pair) - slope).norm(), 1e-6);
+    EXPECT_LT((built.task.jacobian.row(0).transpose() - slope.normalized()).norm(), 1e-6);
+    EXPECT_NEAR(built.task.rate[0], 2.0 * 0.05 / slope.norm(), 1e-5);
+    EXPECT_NEAR(built.task.activation[0], 0.5, 1e-9);
+  }
+}
+
+TEST(SelfCollision, LinksThatCrossArePartedAlongTheFallback) {
+  const Robot robot = arm(6);
+  Random random(12);
+  const Posture posture = at(robot, random_q(random, 6));
+  LinkPair pair{.a = robot.n_links() - 1, .b = 0, .distance = 0.0};
+  pair.on_a_W = pair.on_b_W = Vector3(0.1, 0.2, 0.3);
+  pair.fallback_normal_W = Vector3::UnitX();
+  BuiltTask built;
+  build_self_collision({}, robot, posture, {&pair, 1}, built);
+  EXPECT_TRUE(built.task.jacobian.allFinite());
+  EXPECT_GT(built.task.jacobian.norm(), 0.9);
+  EXPECT_EQ(built.task.activation[0], 1.0);
+}
+
 TEST(TaskSpec, NamesTheFieldItsValueAndItsBound) {
   const TaskSpec bad[] = {Avoidance{.d_min = -0.1},
                           Avoidance{.buffer = 0.0},
@@ -396,6 +440,8 @@ TEST(Tasks, AllocateNothing) {
   build_joint_limits({}, robot, posture, built);
   build_minimum_altitude({}, robot, posture, built);
   build_manipulability({}, robot, posture, built);
+  const LinkPair links{.a = 1, .b = 0, .on_a_W = Vector3::UnitX(), .distance = 0.1};
+  build_self_collision({}, robot, posture, {&links, 1}, built);
   EXPECT_EQ(counter.count(), 0U);
 }
 

@@ -4,7 +4,9 @@ Ranges become a cloud, the robot's own body is removed from it, the closest pair
 and robot drives a highest-priority avoidance task; the goal is reached in what freedom is left.
 """
 
+from importlib import import_module as _import_module
 from importlib.metadata import version as _version
+from typing import TYPE_CHECKING
 
 from proxcgal._core import (
     Admittance,
@@ -35,6 +37,7 @@ from proxcgal._core import (
     Mount,
     Reach,
     Scan,
+    SelfCollision,
     SensorModel,
     SignedDistances,
     Skin,
@@ -79,6 +82,9 @@ from proxcgal.models import (
     ring_skin,
 )
 
+if TYPE_CHECKING:
+    from proxcgal.apps.joint_server import GoalRefusedError, JointGoal, JointRobotServer
+
 __version__ = _version("proxcgal")
 
 __all__ = [
@@ -98,7 +104,10 @@ __all__ = [
     "GuardConfig",
     "HandGuide",
     "IsoSeparation",
+    "GoalRefusedError",
+    "JointGoal",
     "JointLimits",
+    "JointRobotServer",
     "JointSpec",
     "LinkCapsule",
     "LinkSpec",
@@ -119,6 +128,7 @@ __all__ = [
     "RecordingError",
     "Robot",
     "Scan",
+    "SelfCollision",
     "SensorModel",
     "SignedDistances",
     "SimulationError",
@@ -149,3 +159,15 @@ __all__ = [
     "solve",
     "zone_directions",
 ]
+
+#: Made on first use: they need the simulator, which takes longer to import than all the rest.
+_LATER = {
+    name: "proxcgal.apps.joint_server"
+    for name in ("GoalRefusedError", "JointGoal", "JointRobotServer")
+}
+
+
+def __getattr__(name: str) -> object:
+    if name in _LATER:
+        return getattr(_import_module(_LATER[name]), name)
+    raise AttributeError(f"module 'proxcgal' has no attribute '{name}'")

@@ -89,6 +89,7 @@ struct TickOutput {
   /// [m/s] of the pair's obstacle: as estimated (`tick`) or given (`tick_known`).
   Vector3 obstacle_velocity_W = Vector3::Zero();
   ControlPair control;  ///< what the first avoidance row acts on, with its obstacle's velocity
+  LinkPair own;         ///< what the first self-collision row acts on
   Mode mode = Mode::kRun;
   int n_tasks = 0;
   std::array<TaskReport, kMaxLevels> tasks;

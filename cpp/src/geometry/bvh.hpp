@@ -32,6 +32,26 @@ struct BvhView {
   double scale;  // largest coordinate: sets the rounding allowance
 };
 
+struct PairBox {
+  Vector3 low, high;
+};
+
+/// A pair of subtrees of two trees; a negative row is a block.
+struct PendingPair {
+  double key;  ///< no pair of their triangles is nearer, squared
+  std::int32_t here, there;
+  PairBox box_here, box_there;  ///< both in the first tree's frame
+};
+using PairHeap = std::vector<PendingPair>;
+inline constexpr std::size_t kPairHeap = 4096;  ///< pairs that a bounded search keeps at most
+
+/// What a search between two trees may take.
+struct PairWork {
+  PairHeap& heap;
+  std::int64_t& steps;  ///< counted down
+  bool bounded;         ///< the heap grows no larger than its storage
+};
+
 /// Flat four-wide tree over a link's triangles: what the tick walks.
 class Bvh {
  public:
@@ -44,8 +64,11 @@ class Bvh {
   bool any_hit(const Vector3& origin, const Vector3& direction, double t_min, double t_max) const;
   double first_hit(const Vector3& origin, const Vector3& direction, double t_min) const;
   /// Squared distance to another surface whose frame has pose T_LO in this one's.
+  /// @param[out] cut  the work was used up: a lower bound was returned, with the nearest points
+  ///                  found so far, NaN for none
   double squared_distance(const Bvh& other, const Pose& T_LO, double squared_bound,
-                          Vector3* on_this, Vector3* on_other) const;
+                          Vector3* on_this, Vector3* on_other, const PairWork& work,
+                          bool& cut) const;
 
   BvhView view() const { return {nodes_.data(), blocks_.data(), scale_}; }
 

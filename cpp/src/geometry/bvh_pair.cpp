@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "bvh.hpp"
 #include "triangle.hpp"
@@ -80,16 +81,12 @@ Triangle triangle_of(const TriangleBlock& block, int lane) {
   return t;
 }
 
-struct Box {
-  Vector3 low, high;
-};
-
-double gap_squared(const Box& x, const Box& y) {
+double gap_squared(const PairBox& x, const PairBox& y) {
   return (x.low - y.high).cwiseMax(y.low - x.high).cwiseMax(0.0).squaredNorm();
 }
 
-Box box_of(const BvhNode& node, int lane) {
-  Box box;
+PairBox box_of(const BvhNode& node, int lane) {
+  PairBox box;
   for (int k = 0; k < 3; ++k) {
     box.low[k] = static_cast<double>(node.low[k][lane]);
     box.high[k] = static_cast<double>(node.high[k][lane]);
@@ -97,7 +94,7 @@ Box box_of(const BvhNode& node, int lane) {
   return box;
 }
 
-Box moved(const Box& box, const Pose& T) {
+PairBox moved(const PairBox& box, const Pose& T) {
   const Vector3 center = T * Vector3(0.5 * (box.low + box.high));
   const Vector3 half = T.linear().cwiseAbs() * (0.5 * (box.high - box.low));
   return {center - half, center + half};
@@ -111,33 +108,29 @@ double sphere_gap(const Vector3& center, double radius, const TriangleBlock& blo
   return std::max(0.0, std::sqrt(nearest.squared) - radius);
 }
 
-/// A pair of subtrees; a negative row is a block.
-struct Pending {
-  double key;
-  std::int32_t here, there;
-  Box box_here, box_there;  // the second in this surface's frame
-};
-
 }  // namespace
 
 double Bvh::squared_distance(const Bvh& other, const Pose& T_LO, double squared_bound,
-                             Vector3* on_this, Vector3* on_other) const {
+                             Vector3* on_this, Vector3* on_other, const PairWork& work,
+                             bool& cut) const {
   Witness best;
   best.squared = squared_bound;
   const Pose T_OL = T_LO.inverse();
   const auto everything = [](const Bvh& bvh) {
-    Box box{Vector3::Constant(kInfinity), Vector3::Constant(-kInfinity)};
+    PairBox box{Vector3::Constant(kInfinity), Vector3::Constant(-kInfinity)};
     for (int lane = 0; lane < kWide; ++lane) {
       if (bvh.nodes_[0].child[lane] == kEmpty) continue;
-      const Box part = box_of(bvh.nodes_[0], lane);
+      const PairBox part = box_of(bvh.nodes_[0], lane);
       box.low = box.low.cwiseMin(part.low);
       box.high = box.high.cwiseMax(part.high);
     }
     return box;
   };
-  std::vector<Pending> heap;
-  const auto later = [](const Pending& x, const Pending& y) { return x.key > y.key; };
-  const auto push = [&](std::int32_t here, std::int32_t there, const Box& a, const Box& b) {
+  PairHeap& heap = work.heap;
+  heap.clear();
+  cut = false;
+  const auto later = [](const PendingPair& x, const PendingPair& y) { return x.key > y.key; };
+  const auto push = [&](std::int32_t here, std::int32_t there, const PairBox& a, const PairBox& b) {
     double key = gap_squared(a, b);
     if (!(key < best.squared)) return;
     if (there < 0 && here >= 0) {
@@ -157,9 +150,18 @@ double Bvh::squared_distance(const Bvh& other, const Pose& T_LO, double squared_
   push(0, 0, everything(*this), moved(everything(other), T_LO));
   while (!heap.empty()) {
     std::pop_heap(heap.begin(), heap.end(), later);
-    const Pending pair = heap.back();
+    const PendingPair pair = heap.back();
     heap.pop_back();
     if (!(pair.key < best.squared) || best.squared == 0.0) break;
+    cut = --work.steps < 0 || (work.bounded && heap.size() + kWide > kPairHeap);
+    if (cut) {  // nothing that is left is nearer than the pair that comes next
+      if (!(best.squared < squared_bound)) {
+        best.here.setConstant(std::numeric_limits<double>::quiet_NaN());
+        best.there = best.here;
+      }
+      best.squared = pair.key;
+      break;
+    }
     if (pair.here < 0 && pair.there < 0) {
       const TriangleBlock& a = blocks_[static_cast<std::size_t>(~pair.here)];
       const TriangleBlock& b = other.blocks_[static_cast<std::size_t>(~pair.there)];
@@ -193,7 +195,7 @@ double Bvh::squared_distance(const Bvh& other, const Pose& T_LO, double squared_
                                     : other.nodes_[static_cast<std::size_t>(pair.there)];
     for (int lane = 0; lane < kWide; ++lane) {
       if (node.child[lane] == kEmpty) continue;
-      const Box box = box_of(node, lane);
+      const PairBox box = box_of(node, lane);
       open_here ? push(node.child[lane], pair.there, box, pair.box_there)
                 : push(pair.here, node.child[lane], pair.box_here, moved(box, T_LO));
     }

@@ -195,11 +195,27 @@ double MeshTree::winding_number(const Vector3& point_L) const {
   return half_angles / (2.0 * std::acos(-1.0));
 }
 
+struct PairSearch::Impl {
+  detail::PairHeap heap;
+};
+PairSearch::PairSearch() : impl_(std::make_unique<Impl>()) {
+  impl_->heap.reserve(detail::kPairHeap);
+}
+PairSearch::~PairSearch() = default;
+PairSearch::PairSearch(PairSearch&&) noexcept = default;
+PairSearch& PairSearch::operator=(PairSearch&&) noexcept = default;
+
 double MeshTree::distance(const MeshTree& other, const Pose& T_LO, double bound, Vector3* on_this_L,
-                          Vector3* on_other_L) const {
+                          Vector3* on_other_L, PairSearch* search) const {
   const double squared_bound = bound * bound;
-  const double squared =
-      impl_->bvh.squared_distance(other.impl_->bvh, T_LO, squared_bound, on_this_L, on_other_L);
+  detail::PairHeap own;
+  std::int64_t any = kAnySteps;
+  const detail::PairWork work{search != nullptr ? search->impl_->heap : own,
+                              search != nullptr ? search->steps : any, search != nullptr};
+  bool cut = false;
+  const double squared = impl_->bvh.squared_distance(other.impl_->bvh, T_LO, squared_bound,
+                                                     on_this_L, on_other_L, work, cut);
+  if (search != nullptr) search->lower_bound = cut;
   return squared < squared_bound ? std::sqrt(squared) : kInfinity;
 }
 

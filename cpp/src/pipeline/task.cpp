@@ -6,6 +6,7 @@
 #include <iterator>
 #include <numbers>
 
+#include "proxcgal/error.hpp"
 #include "require.hpp"
 
 namespace proxcgal {
@@ -88,6 +89,16 @@ JointVector opening_row(const Robot& robot, const Posture& posture, const Contro
   return J.topRows<3>().transpose() * normal_W(pair);
 }
 
+JointVector parting_row(const Robot& robot, const Posture& posture, const LinkPair& pair) {
+  const Vector3 apart = pair.on_a_W - pair.on_b_W;
+  const bool crossing = !(apart.norm() > 1e-9);  // [m] no direction is left in the rounding
+  const Vector3 n_W = crossing ? pair.fallback_normal_W : Vector3(apart.normalized());
+  Jacobian6 J_a, J_b;
+  robot.jacobian(posture, pair.a, pair.on_a_W, J_a);
+  robot.jacobian(posture, pair.b, pair.on_b_W, J_b);
+  return (J_a - J_b).topRows<3>().transpose() * n_W;
+}
+
 double decreasing(double x, double a, double b) {
   if (x <= a) return 1.0;
   if (x >= b) return 0.0;
@@ -131,11 +142,21 @@ void Manipulability::validate() const {
           "between 0 and " + std::to_string(kMaxJoints - 1));
   require(joints == 0 || (joints >= 6 && joints <= kMaxJoints), "Manipulability.joints", joints,
           "0 (all) or between 6 and " + std::to_string(kMaxJoints));
+  require(positive(unit), "Manipulability.unit", unit, "finite and above 0");
+}
+
+void SelfCollision::validate() const {
+  require(std::isfinite(d_min) && d_min >= 0.0, "SelfCollision.d_min", d_min,
+          "finite and at least 0 m");
+  require(positive(buffer), "SelfCollision.buffer", buffer, "finite and above 0 m");
+  require(positive(gain), "SelfCollision.gain", gain, "finite and above 0 1/s");
+  require(nearest >= 1 && nearest <= kMaxRows, "SelfCollision.nearest", nearest,
+          "between 1 and " + std::to_string(kMaxRows));
 }
 
 const char* task_name(const TaskSpec& spec) {
-  constexpr const char* names[] = {"avoidance", "reach", "joint_limits", "minimum_altitude",
-                                   "manipulability"};
+  constexpr const char* names[] = {"avoidance",        "reach",          "joint_limits",
+                                   "minimum_altitude", "manipulability", "self_collision"};
   static_assert(std::size(names) == std::variant_size_v<TaskSpec>);
   const auto* reach = std::get_if<Reach>(&spec);
   if (reach != nullptr && reach->rows == ReachRows::kPosition) return "reach_position";
@@ -149,6 +170,13 @@ void validate(const TaskSpec& spec) {
 
 void validate(const TaskSpec& spec, const Robot& robot) {
   validate(spec);
+  if (const auto* own = std::get_if<SelfCollision>(&spec)) {
+    for (const auto& [a, b] : own->pairs) {
+      if (robot.link_row(a) == robot.link_row(b)) {
+        throw ConfigError("SelfCollision.pairs names '" + a + "' beside itself");
+      }
+    }
+  }
   const auto* manipulability = std::get_if<Manipulability>(&spec);
   if (manipulability == nullptr) return;
   const int joints = static_cast<int>(arm_size(*manipulability, robot.n_q()));
@@ -244,9 +272,25 @@ void build_manipulability(const Manipulability& spec, const Robot& robot, const 
       }
     }
   }
+  mu /= spec.unit;
+  task.jacobian /= spec.unit;
   task.rate[0] = spec.gain * (spec.target - mu);
   task.activation[0] = decreasing(mu, spec.low, spec.high);
   scale(out, 0);
+}
+
+void build_self_collision(const SelfCollision& spec, const Robot& robot, const Posture& posture,
+                          std::span<const LinkPair> pairs, BuiltTask& out) {
+  const auto m = std::min<Eigen::Index>(static_cast<Eigen::Index>(pairs.size()), kMaxRows);
+  Task& task = cleared(out, m, robot.n_q());
+  const double inactive_from = spec.d_min + spec.buffer;
+  for (Eigen::Index i = 0; i < m; ++i) {
+    const LinkPair& pair = pairs[static_cast<std::size_t>(i)];
+    task.jacobian.row(i) = parting_row(robot, posture, pair).transpose();
+    task.rate[i] = spec.gain * (inactive_from - pair.distance);
+    task.activation[i] = decreasing(pair.distance, spec.d_min, inactive_from);
+    scale(out, i);
+  }
 }
 
 double row_norm(const Robot& robot, const Posture& posture, const ControlPair& pair) {

@@ -31,6 +31,7 @@ KINDS = {
     "static": "proxcgal.study.static",
     "faults": "proxcgal.study.faults",
     "walkthrough": "proxcgal.study.walk",
+    "joint": "proxcgal.study.joint",
 }
 if TYPE_CHECKING:
     KindName = str
@@ -46,6 +47,7 @@ class CampaignOptions:
     with all controllers.
     faults: every fault of docs/reliability.md while the arm moves, on two robots: is the mode
     right, how soon, does the arm recover?
+    joint: the 12-joint robot's scenes from each start, with each task on and off, known and sensed.
 
     walkthrough: random operators and paths guide the painting arm, a quarter of them within bounds;
     does the guard trip at once and on nothing else, how does the arm stop?
@@ -64,8 +66,9 @@ class CampaignOptions:
 
     kind: Annotated[KindName, tyro.conf.Positional, tyro.conf.arg(metavar="|".join(KINDS))]
     """What is repeated."""
-    runs: Annotated[int, tyro.conf.arg(metavar="N")] = 100
-    """Draws of each scene, or runs of each fault and robot."""
+    runs: Number = None
+    """Draws of each scene, runs of each fault and robot, or sensed runs of each joint scene and
+    start; left out: 100, joint 5."""
     seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
     """Fixes every random draw."""
     scenario: Annotated[
@@ -105,12 +108,13 @@ def campaign_command(options: CampaignOptions, command: str) -> int:
 
     begin = clock.monotonic()
     workers, kept = checked_workers(options.workers), _kept(options)
+    kind: Kind = import_module(KINDS[options.kind]).KIND
+    runs = kind.runs if options.runs is None else options.runs
     wishes = Wishes(
-        runs=options.runs, seed=options.seed, scenarios=options.scenario,
+        runs=runs, seed=options.seed, scenarios=options.scenario,
         overrides=tuple(flat(options.set)),
     )  # fmt: skip
     announce("drawing scenes (a robot's first time takes a while)", quiet=options.quiet)
-    kind: Kind = import_module(KINDS[options.kind]).KIND
     campaign = kind.plan(wishes)
     _check(campaign)
     workers = workers or default_workers(len(campaign.trials))
@@ -128,7 +132,7 @@ def campaign_command(options: CampaignOptions, command: str) -> int:
             recorded = keep_worst(chosen, folder, ticks, near, quiet=options.quiet)
         failed = [e for e in ended if e.outcome.error is not None]
         summary = {
-            "campaign": options.kind, "seed": options.seed, "runs": options.runs,
+            "campaign": options.kind, "seed": options.seed, "runs": runs,
             "trials": len(ended), "failed": [_failure(e) for e in failed],
             **kind.analyse(table, campaign), "worst": recorded,
         }  # fmt: skip
@@ -151,7 +155,7 @@ def _kept(options: CampaignOptions) -> int:
     form, _, count = options.keep.partition(":")
     if options.keep != "none" and not (form == "worst" and count.isdecimal()):
         problems.append(f"--keep {options.keep}: must be worst:N, such as worst:5, or none")
-    if options.runs < 1:
+    if options.runs is not None and options.runs < 1:
         problems.append(f"--runs {options.runs}: must be 1 or more")
     if options.seed < 0:
         problems.append(f"--seed {options.seed}: must be 0 or more")

@@ -49,7 +49,7 @@ def _parts(kind: Kind, stored: StoredCampaign) -> Iterator[str]:
     for sentence in kind.verdicts(summary):
         yield f"<p>{escape(sentence)}</p>"
     for listing in kind.listings(summary):
-        yield from _listing(listing)
+        yield from listing_part(listing)
     replays = Replays(REPLAY_BYTES)
     worst = _replay_of_worst(stored, replays)
     budget = PICTURE_BYTES - replays.used
@@ -62,7 +62,8 @@ def _parts(kind: Kind, stored: StoredCampaign) -> Iterator[str]:
     yield from replays.parts()
 
 
-def _listing(listing: Listing) -> Iterator[str]:
+def listing_part(listing: Listing) -> Iterator[str]:
+    """A table as HTML."""
     yield f'<div class="scroll"><table><caption>{escape(listing.caption)}</caption><thead><tr>'
     for column, (name, unit) in enumerate(zip(listing.names, listing.units, strict=True)):
         side = ' class="left"' if column < listing.left else ""

@@ -25,6 +25,7 @@ usage: proxcgal COMMAND ...
   coverage SCENARIO   what the sensors see of the space round the arm
   sweep          time both algorithms, literal and accelerated, over meshes and clouds
   view SCENARIO  a scene in the browser, live: drag the obstacle
+  serve          take goals for the 12-joint robot over TCP, one JSON object a line
   replay FILE    step through a recording
   report DIR     write DIR/report.html from the results in DIR
   scenarios      the scenes there are
@@ -51,6 +52,7 @@ COMMANDS = {
     "coverage": "proxcgal.apps.coverage",
     "sweep": "proxcgal.apps.sweep",
     "view": "proxcgal.apps.view",
+    "serve": "proxcgal.apps.serve",
     "replay": "proxcgal.apps.replay",
     "report": "proxcgal.apps.report",
     "scenarios": "proxcgal.apps.lists",

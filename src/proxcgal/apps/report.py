@@ -45,8 +45,9 @@ def write_report(folder: Path) -> Path:
         ConfigError: no such folder, no `summary.json` in it, or files that cannot be read.
     """
     from proxcgal.apps.campaign_page import campaign_page
+    from proxcgal.apps.joint_page import joint_page
     from proxcgal.apps.page import page
-    from proxcgal.apps.stored import read_campaign, read_runs, read_sweep, read_walk
+    from proxcgal.apps.stored import read_campaign, read_joint, read_runs, read_sweep, read_walk
     from proxcgal.apps.sweep_page import sweep_page
     from proxcgal.apps.walk_page import walk_page
 
@@ -56,6 +57,8 @@ def write_report(folder: Path) -> Path:
         text = campaign_page(campaign)
     elif walk := read_walk(folder):
         text = walk_page(walk)
+    elif joint := read_joint(folder):
+        text = joint_page(joint)
     else:
         text = page(*read_runs(folder))
     path = folder / "report.html"

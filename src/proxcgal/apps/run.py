@@ -38,17 +38,20 @@ class RunOptions:
       proxcgal run side_plane --controller wb sm --seed 3 --out out/side
       proxcgal run front_plane --set controller.d_min=0.25 simulation.dropout=0.1
       proxcgal run walkthrough_overspeed
+      proxcgal run joint_gate --set controller.off='["minimum_altitude"]'
       proxcgal run my_scene.toml --robot my_arm.urdf --package-dir ~/robots
     """
 
     scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO")]
     """A name that `proxcgal scenarios` lists, or a path to a TOML file."""
     controller: Annotated[
-        tuple[ControllerName, ...], tyro.conf.arg(metavar="wb|sm|wb_known|wb_memory ...")
-    ] = ("wb", "sm", "wb_known")
+        tuple[ControllerName, ...] | None,
+        tyro.conf.arg(metavar="wb|sm|wb_known|wb_memory ...", help_behavior_hint=""),
+    ] = None
     """wb: the whole body avoids. sm: only the sensors' mounting points do, the baseline.
     wb_known: wb on points of the scene itself, the ceiling. wb_memory: wb that remembers what left
-    the sensors' view."""
+    the sensors' view. Left out: wb sm wb_known; of a scene of kind `joint` wb_known, or wb where
+    its perception is sensed."""
     robot: Annotated[str | None, tyro.conf.arg(metavar="NAME|PATH", help_behavior_hint="")] = None
     """A name that `proxcgal robots` lists, or a .urdf or .xml file, instead of the scenario's."""
     package_dir: Folders = ()
@@ -74,10 +77,12 @@ def run_command(options: RunOptions, command: str) -> int:
     from proxcgal.apps.origin import origin
     from proxcgal.apps.report import write_report
     from proxcgal.apps.results import Plan, check, perform
+    from proxcgal.apps.run_joint import run_joint
     from proxcgal.errors import ConfigError
     from proxcgal.sim.scenario import load_scenario
+    from proxcgal.sim.scenario_joint import JointScenario
 
-    if not options.controller:
+    if options.controller == ():
         raise ConfigError(
             "--controller: none given, at least one of wb, sm, wb_known, wb_memory is needed"
         )
@@ -85,9 +90,13 @@ def run_command(options: RunOptions, command: str) -> int:
     scenario = load_scenario(options.scenario, overrides(options))
     if scenario.kind == "walkthrough":
         return _run_walkthrough(scenario, options, command)
-    controllers = tuple(dict.fromkeys(options.controller))
-    check(scenario, controllers, quiet=options.quiet)
+    controllers = tuple(dict.fromkeys(options.controller or scenario.controllers()))
     folder = options.out or Path("out") / scenario.name
+    if isinstance(scenario, JointScenario):
+        return run_joint(
+            scenario, controllers, folder, command, workers=workers, quiet=options.quiet
+        )
+    check(scenario, controllers, quiet=options.quiet)
     plan = Plan(scenario=scenario, controllers=controllers, folder=folder)
     summaries = perform(
         [plan],

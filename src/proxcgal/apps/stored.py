@@ -171,6 +171,17 @@ def read_campaign(folder: Path) -> StoredCampaign | None:
     return StoredCampaign(folder, summary, _model(About, made) if made.is_file() else About())
 
 
+def read_joint(folder: Path) -> StoredCampaign | None:
+    """One scene's runs of the 12-joint robot; None where its summary is of something else.
+
+    Raises: as `read_campaign`.
+    """
+    made, summary = folder / "run.json", _json(folder / "summary.json")
+    if "campaign" in summary or "runs" not in summary:
+        return None
+    return StoredCampaign(folder, summary, _model(About, made) if made.is_file() else About())
+
+
 def read_sweep(folder: Path) -> Sweep | None:
     """The timing grid of a folder; None where its summary is of something else.
 

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections import Counter
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from proxcgal.errors import GeometryError, ModelError
-from proxcgal.models.description import Frame, Joint, Link, RobotDescription, listed
+from proxcgal.errors import GeometryError
+from proxcgal.models.joining import joined, rigid
 from proxcgal.models.meshes import check_mesh, clean, load_mesh
 from proxcgal.models.resolution import ControlMesh, control_mesh
 from proxcgal.models.robots import Robot
@@ -37,34 +34,10 @@ def attach(
     Raises:
         ModelError: no such link, a pose that is none, or names that are not unique in the end.
     """
-    first, second = ("", prefix) if isinstance(prefix, str) else prefix
-    where = robot.description.frame(link)
-    T_JB = where.T_JF @ rigid(pose, "pose")
-    own = renamed(robot.description, first)
-    added = renamed(moved(other.description, T_JB, where.joint, robot.n_q), second)
-    links = list(zip((*own.links, *added.links), (*robot.control, *other.control), strict=True))
-    links.sort(key=lambda pair: pair[0].joint)
-    joined = replace(
-        own,
-        name=f"{robot.name}_{other.name}",
-        joints=(*own.joints, *added.joints),
-        links=tuple(pair[0] for pair in links),
-        frames=(*own.frames, *added.frames),
-        tool=added.tool,
-        source=f"{own.source} + {added.source}",
-    )
-    names: dict[str, Sequence[str]] = {
-        "joint": joined.joint_names,
-        "link": joined.link_names,
-        "frame": [frame.name for frame in joined.frames],
-    }
-    for kind, all_names in names.items():
-        if twice := [name for name, count in Counter(all_names).items() if count > 1]:
-            raise ModelError(
-                f"attach with prefix {prefix!r}: both robots have {kind} {listed(twice)}; a prefix "
-                "that sets them apart is needed"
-            )
-    return Robot(joined, [pair[1] for pair in links])
+    prefixes = ("", prefix) if isinstance(prefix, str) else prefix
+    one, order = joined(robot.description, link, other.description, pose, prefixes)
+    control = (*robot.control, *other.control)
+    return Robot(one, [control[row] for row in order])
 
 
 def attach_mesh(
@@ -114,59 +87,6 @@ def attach_mesh(
         max(kept.deviation, coarse.deviation),
     )
     return Robot(replace(robot.description, links=tuple(links)), control)
-
-
-def rigid(pose: ArrayLike, what: str) -> Floats:
-    """A (4, 4) rigid pose.
-
-    Raises:
-        ModelError: it is none.
-    """
-    T = np.asarray(pose, dtype=np.float64)
-    if T.shape != (4, 4) or not np.isfinite(T).all():
-        raise ModelError(f"{what} has shape {T.shape}; a finite (4, 4) pose is needed")
-    R = T[:3, :3]
-    turns = np.abs(R @ R.T - np.eye(3)).max() < 1e-6 and np.linalg.det(R) > 0
-    if not turns or (T[3] != [0, 0, 0, 1]).any():
-        raise ModelError(f"{what} is {T.tolist()}; a rotation and a translation are needed")
-    return T
-
-
-def renamed(description: RobotDescription, prefix: str) -> RobotDescription:
-    """The same robot with `prefix` before the names of its joints, links and frames."""
-
-    def name(part: Any) -> Any:
-        return replace(part, name=prefix + part.name)
-
-    return replace(
-        description,
-        joints=tuple(name(joint) for joint in description.joints),
-        links=tuple(name(link) for link in description.links),
-        frames=tuple(name(frame) for frame in description.frames),
-        tool=prefix + description.tool,
-    )
-
-
-def moved(description: RobotDescription, T_JB: Floats, joint: int, offset: int) -> RobotDescription:
-    """The robot hung on a joint of another: its rows shifted by `offset`, its base at T_JB."""
-
-    def row(own: int) -> int:
-        return joint if own < 0 else own + offset
-
-    def placed(own: int, pose: Floats) -> Floats:
-        return T_JB @ pose if own < 0 else pose
-
-    joints: list[Joint] = [
-        replace(j, parent=row(j.parent), origin=placed(j.parent, j.origin))
-        for j in description.joints
-    ]
-    links: list[Link] = [
-        replace(k, joint=row(k.joint), T_JL=placed(k.joint, k.T_JL)) for k in description.links
-    ]
-    frames: list[Frame] = [
-        replace(f, joint=row(f.joint), T_JF=placed(f.joint, f.T_JF)) for f in description.frames
-    ]
-    return replace(description, joints=tuple(joints), links=tuple(links), frames=tuple(frames))
 
 
 def _triangles_of(mesh: Mesh) -> tuple[Floats, Ints, int]:

@@ -9,9 +9,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from proxcgal.errors import ModelError
 from proxcgal.models.description import Frame, RobotDescription
-from proxcgal.models.limits import LIMITS, Limits
+from proxcgal.models.joining import joined
+from proxcgal.models.limits import LIMITS, Limits, with_limits
 from proxcgal.models.read import read_description
 
 if TYPE_CHECKING:
@@ -62,11 +65,22 @@ def _ga_ol() -> RobotDescription:
 
 _GA_OL = Path(__file__).with_name("ga_ol.toml")
 
+def _kr150_ur10e() -> RobotDescription:
+    """Both arms with their own limits, the UR10e's base on the KUKA's flange, coaxial.
+
+    `tool0` of the KUKA is link_6 turned by pitch +90 degrees, its z out of the flange.
+    """
+    carrying, carried = (with_limits(BUILTIN[name].describe(), LIMITS[name], None, None)
+                         for name in ("kr150", "ur10e"))  # fmt: skip
+    return joined(carrying, "tool0", carried, np.eye(4), ("kuka_", "ur10e_"))[0]
+
+
 BUILTIN: dict[str, Builtin] = {
     "ur10e": Builtin("Universal Robots UR10e, 6 joints", _ur10e, LIMITS["ur10e"]),
     "panda": Builtin("Franka Emika Panda, 7 joints, no hand", _panda, LIMITS["panda"]),
     "kr150": Builtin("KUKA KR 150-2, 6 joints", _kr150, LIMITS["kr150"]),
     "ga_ol": Builtin("painting arm of capsules, 6 joints, lengths and masses ours", _ga_ol, None),
+    "kr150_ur10e": Builtin("UR10e on the flange of a KUKA KR 150-2, 12 joints", _kr150_ur10e, None),
 }
 
 

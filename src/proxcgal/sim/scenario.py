@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field, ValidationError
 
@@ -25,6 +25,9 @@ from proxcgal.sim.scenario_keys import (
 from proxcgal.sim.scenario_law import Controller
 from proxcgal.sim.scenario_problems import lines
 from proxcgal.sim.scene import ObstacleScene, Scene
+
+if TYPE_CHECKING:
+    from proxcgal.sim.scenario_joint import Finish
 
 #: wb: whole body; sm: sensor points; wb_known: whole body on points of the scene itself; wb_memory:
 #: whole body that remembers what left the sensors' view.
@@ -66,6 +69,18 @@ class Scenario(Section):
         """What stands and moves beside the robot."""
         return ObstacleScene(self.obstacles)
 
+    def start(self) -> tuple[str, tuple[float, ...]]:
+        """Joint positions at 0 s, and the key that gives them."""
+        return "q0", self.q0
+
+    def controllers(self) -> tuple[str, ...]:
+        """Those of a run that names none."""
+        return USUAL
+
+    def ends(self) -> Finish | None:
+        """When a run is over before its time; None: never."""
+        return None
+
     def to_toml(self) -> str:
         """The file that gives this scenario again, with every default written out."""
         return toml.write(self.model_dump(by_alias=True))
@@ -73,9 +88,13 @@ class Scenario(Section):
 
 def kinds() -> dict[str, type[Scenario]]:
     """The class of each `kind`."""
-    from proxcgal.sim.walk.keys import GuidedScenario, WalkScenario  # made from Scenario
+    from proxcgal.sim.scenario_joint import JointScenario  # made from Scenario, as those below
+    from proxcgal.sim.walk.keys import GuidedScenario, WalkScenario
 
-    return {"static": Scenario, "walkthrough": WalkScenario, "guided": GuidedScenario}
+    return {
+        "static": Scenario, "joint": JointScenario, "walkthrough": WalkScenario,
+        "guided": GuidedScenario,
+    }  # fmt: skip
 
 
 def list_scenarios() -> dict[str, str]:

@@ -161,12 +161,19 @@ class Skin(Section):
     """The sensors on the robot."""
 
     rings: tuple[Ring, ...] = Field(min_length=1, description="at least one")
+    optional: tuple[Ring, ...] = Field((), description="further rings, off unless asked for")
+    with_optional: bool = Field(False, description="the rings of `optional` are there too")
     sensor: Sensor = Field(default_factory=Sensor)
     check_mounts: bool = Field(
         True,
         description="compare what sensors see of the arm itself with their mounts, 2 s before the "
         "run; wrong ones refuse it",
     )
+
+    @property
+    def fitted(self) -> tuple[Ring, ...]:
+        """The rings that are on the robot."""
+        return (*self.rings, *(self.optional if self.with_optional else ()))
 
 
 class Simulation(Section):

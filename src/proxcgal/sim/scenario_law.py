@@ -25,7 +25,18 @@ TaskName = Literal[
     "joint_limits",
     "minimum_altitude",
     "manipulability",
+    "manipulability_macro",
+    "manipulability_micro",
+    "self_collision",
+    "thesis",
+    "full",
 ]
+#: Names that stand for several tasks. `thesis` is what [JR] 4.2.1 names; `full` adds the joint
+#: limits of its author's code.
+STACKS: dict[str, tuple[TaskName, ...]] = {
+    "thesis": ("minimum_altitude", "avoidance", "reach"),
+    "full": ("joint_limits", "avoidance", "minimum_altitude", "reach"),
+}
 
 
 class Filter(Section):
@@ -167,12 +178,35 @@ class Manipulability(Section):
         "Manipulability", "first_joint", "of the arm that is meant, from 0", ge=0
     )
     joints: int = like("Manipulability", "joints", "of that arm; 0: all from the first on", ge=0)
+    unit: Positive = like("Manipulability", "unit", "it is counted in this: 1, or the maximum")
 
     @model_validator(mode="after")
     def _low_below_high(self) -> Self:
         if self.low >= self.high:
             raise ValueError(f"low is {self.low} and high {self.high}: low must be below high")
         return self
+
+
+class ArmManipulability(Section):
+    """Tasks `manipulability_macro` and `manipulability_micro`: one arm of two, normalised.
+
+    The arm's manipulability counts as a share of the largest that 4000 random postures of the
+    whole robot have.
+    """
+
+    target: Positive = like("Manipulability", "target", "the rate pulls towards it")
+    low: Positive = like("Manipulability", "low", "fully active below")
+    high: Positive = like("Manipulability", "high", "inactive above")
+    gain: Positive = like("Manipulability", "gain", "[1/s]")
+
+
+class SelfCollision(Section):
+    """Task `self_collision`: links that joints beyond the first arm move, against all others."""
+
+    d_min: NonNegative = like("SelfCollision", "d_min", "[m] distance to keep")
+    buffer: Positive = like("SelfCollision", "buffer", "[m] above it, where it begins to act")
+    gain: Positive = like("SelfCollision", "gain", "[1/s]")
+    nearest: Count = like("SelfCollision", "nearest", "this many nearest pairs of links", le=32)
 
 
 class Controller(Section):
@@ -187,6 +221,12 @@ class Controller(Section):
     max_angular: Positive = like("Reach", "max_angular", "[rad/s] of reaching")
     tasks: tuple[TaskName, ...] = Field(
         ("avoidance", "reach"), min_length=1, description="their order is their priority"
+    )
+    off: tuple[TaskName, ...] = Field((), description="tasks of `tasks` that are left out")
+    macro_joints: int = Field(
+        0,
+        ge=0,
+        description="so many first joints are those of an arm that carries another; 0: none",
     )
     min_row_norm: NonNegative = like(
         "ControllerConfig",
@@ -209,8 +249,30 @@ class Controller(Section):
     minimum_altitude: MinimumAltitude = Field(default_factory=MinimumAltitude)
     manipulability: Manipulability = Field(default_factory=Manipulability)
 
+    arm_manipulability: ArmManipulability = Field(default_factory=ArmManipulability)
+    self_collision: SelfCollision = Field(default_factory=SelfCollision)
+
+    @property
+    def levels(self) -> tuple[TaskName, ...]:
+        """The tasks that run, in their order: named stacks spelled out, those that are off left."""
+        return tuple(name for name in self._spelled_out() if name not in self.off)
+
+    def _spelled_out(self) -> list[TaskName]:
+        return [task for name in self.tasks for task in STACKS.get(name, (name,))]
+
     @model_validator(mode="after")
     def _each_task_once(self) -> Self:
-        if len(set(self.tasks)) < len(self.tasks):
+        named = self._spelled_out()
+        if len(set(named)) < len(named):
             raise ValueError("tasks names one of them twice")
+        if unknown := [name for name in self.off if name not in named]:
+            raise ValueError(
+                f"off names {', '.join(unknown)}, but the tasks are {', '.join(named)}"
+            )
+        if not self.levels:
+            raise ValueError("off leaves no task")
+        if not self.macro_joints and (
+            two := [name for name in named if name.endswith(("_macro", "_micro"))]
+        ):
+            raise ValueError(f"{', '.join(two)} needs macro_joints: which joints the first arm has")
         return self

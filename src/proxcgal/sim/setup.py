@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from proxcgal import _core
 from proxcgal.errors import ConfigError
 from proxcgal.models import Robot, load_robot, ring_skin
-from proxcgal.sim import frames
+from proxcgal.sim import arms, frames
 from proxcgal.sim.scenario import CONTROLLERS, Scenario
 from proxcgal.sim.scenario_keys import Section
 from proxcgal.sim.scenario_law import Controller
@@ -87,8 +88,25 @@ class Setup:
 
     def make_tasks(self) -> list[Any]:
         """The scenario's tasks, in order of priority."""
+        return [self._task(name) for name in self.scenario.controller.levels]
+
+    def _task(self, name: str) -> Any:
+        """One level's settings for the core. Raises: ConfigError: two arms that are not there."""
         settings = self.scenario.controller
-        return [_task(name, settings) for name in settings.tasks]
+        if name == "self_collision":
+            return _core.SelfCollision(
+                **_keys(settings.self_collision),
+                pairs=arms.watched_pairs(
+                    self.robot, settings.macro_joints, settings.self_collision.d_min
+                ),
+            )
+        if name in ("manipulability_macro", "manipulability_micro"):
+            first, joints = arms.part(self.robot, settings.macro_joints, name.rpartition("_")[2])
+            return _core.Manipulability(
+                **_keys(settings.arm_manipulability), first_joint=first, joints=joints,
+                unit=arms.largest_manipulability(self.robot, first, joints),
+            )  # fmt: skip
+        return _task(name, settings)
 
     def mesh_hashes(self) -> dict[str, str]:
         """SHA-256 of each link's meshes, as `LINK full` and `LINK control`."""
@@ -116,13 +134,13 @@ def make_skin(scenario: Scenario, robot: Robot) -> _core.Skin:
     names = robot.link_names
     unknown = [
         f"skin.rings.{place}.link = {ring.link!r}: {robot.name} has the links {', '.join(names)}"
-        for place, ring in enumerate(scenario.skin.rings)
+        for place, ring in enumerate(scenario.skin.fitted)
         if ring.link not in names
     ]
     if unknown:
         raise ConfigError("\n".join(f"scenario {scenario.name}: {line}" for line in unknown))
     skin = _core.Skin([], model)
-    for ring in scenario.skin.rings:
+    for ring in scenario.skin.fitted:
         height: dict[str, Any] = {} if ring.standoff is None else {"standoff": ring.standoff}
         skin = skin + ring_skin(
             robot, ring.link, ring.at, ring.sensors, model=model, phase=ring.phase,
@@ -132,20 +150,25 @@ def make_skin(scenario: Scenario, robot: Robot) -> _core.Skin:
 
 
 def _start(scenario: Scenario, robot: Robot) -> Array:
-    q0 = np.array(scenario.q0, np.float64)
-    if len(q0) != robot.n_q:
-        raise ConfigError(
-            f"scenario {scenario.name}: q0 has {len(q0)} values: {robot.name} has {robot.n_q} "
-            f"joints, {', '.join(robot.joint_names)}"
-        )
-    outside = [
-        f"scenario {scenario.name}: q0.{joint} = {q0[joint]:g}: {robot.joint_names[joint]} of "
-        f"{robot.name} goes from {robot.q_min[joint]:g} to {robot.q_max[joint]:g}"
-        for joint in np.flatnonzero((q0 < robot.q_min) | (q0 > robot.q_max))
+    key, values = scenario.start()
+    if problems := posture_problems(robot, values, key):
+        raise ConfigError("\n".join(f"scenario {scenario.name}: {line}" for line in problems))
+    return np.array(values, np.float64)
+
+
+def posture_problems(robot: Robot, q: Sequence[float], key: str) -> list[str]:
+    """Why a robot cannot stand like this, a line each: joint, value, limits."""
+    if len(q) != robot.n_q:
+        return [
+            f"{key} has {len(q)} values: {robot.name} has {robot.n_q} joints, "
+            f"{', '.join(robot.joint_names)}"
+        ]
+    limits = zip(q, robot.joint_names, robot.q_min, robot.q_max, strict=True)
+    return [
+        f"{key}.{row} = {value:g}: {joint} of {robot.name} goes from {low:g} to {high:g}"
+        for row, (value, joint, low, high) in enumerate(limits)
+        if not low <= value <= high
     ]
-    if outside:
-        raise ConfigError("\n".join(outside))
-    return q0
 
 
 def _goal(scenario: Scenario, robot: Robot, q0: Array) -> Array:
@@ -162,6 +185,8 @@ def _goal(scenario: Scenario, robot: Robot, q0: Array) -> Array:
 
 def _task(name: str, settings: Controller) -> Any:
     match name:
+        case "manipulability":
+            return _core.Manipulability(**_keys(settings.manipulability))
         case "avoidance":
             return _core.Avoidance(
                 d_min=settings.d_min, buffer=settings.buffer, gain=settings.avoid_gain,
@@ -177,7 +202,7 @@ def _task(name: str, settings: Controller) -> Any:
             return _core.JointLimits(**_keys(settings.joint_limits))
         case "minimum_altitude":
             return _core.MinimumAltitude(**_keys(settings.minimum_altitude))
-    return _core.Manipulability(**_keys(settings.manipulability))
+    raise ConfigError(f"task {name!r} is unknown")
 
 
 def _keys(section: Section) -> dict[str, Any]:

@@ -14,6 +14,8 @@ from proxcgal.models import Robot
 from proxcgal.sim.coverage import coverage_of
 from proxcgal.sim.decisive import decisive_truth
 from proxcgal.sim.faults import FaultInjector
+from proxcgal.sim.finish import Ending, GoalWatch
+from proxcgal.sim.holding import concluded
 from proxcgal.sim.loop import run_ticks
 from proxcgal.sim.mounting import require_mounts
 from proxcgal.sim.recorder import Recorder, Settings
@@ -87,6 +89,9 @@ def run_trial(
             )
         )  # fmt: skip
         log = _Log(recorder, setup, scenario.simulation.sensor_hz)
+    finish = scenario.ends()
+    watch = None if finish is None else GoalWatch(finish, setup.goal)
+    ending = None
     ticks: list[Tick] = []
     reached: list[Array] = []  # where the arm really was: a fault may tell the controller otherwise
     period = law.config.period
@@ -100,8 +105,16 @@ def run_trial(
             log.write(ticks[-1], (len(ticks) - 1) * period, law)
         if on_progress is not None and len(ticks) % beat == 0:
             on_progress(min(len(ticks) * period / scenario.duration, 1.0))
+        if watch is not None:
+            ending = watch((len(ticks) - 1) * period, np.asarray(setup.robot.tool_pose(given.q)))
+            if ending is not None:
+                break
     if on_progress is not None:
         on_progress(1.0)
+    if watch is not None:
+        last = (len(ticks) - 1) * period
+        cloud_W = np.asarray(law.cloud_W()) if known is None else known(last)
+        ending = concluded(setup, ending or Ending("aborted", "the time is up"), ticks[-1], cloud_W)
     # Not the ticks' own time, which a fault may make jump.
     elapsed = np.arange(len(ticks), dtype=np.float64) * period
     if truth is None and not without_truth:
@@ -109,7 +122,7 @@ def run_trial(
     log_of_run = TrialLog.of(
         ticks, setup.robot, scenario=scenario.name, controller=controller, seed=seed,
         wall_s=clock.perf_counter() - begin, elapsed=elapsed,
-        recording_failure=recorder.failure if recorder else None,
+        recording_failure=recorder.failure if recorder else None, ending=ending,
     )  # fmt: skip
     if not coverage:
         return log_of_run

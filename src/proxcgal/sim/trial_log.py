@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from proxcgal.models import Robot
 from proxcgal.sim.coverage import NO_COVERAGE, Coverage
-from proxcgal.sim.ticks import Tick
+from proxcgal.sim.finish import Ending
+from proxcgal.sim.ticks import TaskResult, Tick, TickResult
 
 Array = NDArray[np.float64]
 
@@ -51,6 +54,11 @@ class TrialLog:
     tick_us: Array  #: (n,) wall time of the controller's call
     coverage: Coverage = NO_COVERAGE  #: nan where not asked for
     recording_failure: str | None = None  #: why the recording stopped early
+    ending: Ending | None = None  #: how it ended, where a scene says when a run is over
+    task_names: tuple[str, ...] = ()  #: of each level, the most important first
+    task_activation: Array = field(default_factory=lambda: np.zeros((0, 0)))  #: (n, k) largest row
+    task_rate: Array = field(default_factory=lambda: np.zeros((0, 0)))  #: (n, k) |reference rate|
+    task_residual: Array = field(default_factory=lambda: np.zeros((0, 0)))  #: (n, k) |A residual|
 
     @classmethod
     def of(
@@ -64,6 +72,7 @@ class TrialLog:
         wall_s: float,
         elapsed: Array | None = None,
         recording_failure: str | None = None,
+        ending: Ending | None = None,
     ) -> TrialLog:
         """Puts ticks together; without `elapsed` the caller's clock is believed."""
         given = [tick.given for tick in ticks]
@@ -102,6 +111,8 @@ class TrialLog:
             findings=dict(found),
             tick_us=np.array([r.tick_us for r in results]),
             recording_failure=recording_failure,
+            ending=ending,
+            **_tasks(results),
         )
 
     def summary(self) -> dict[str, float | int]:
@@ -117,6 +128,26 @@ class TrialLog:
             "leaked_points_max": int(self.leaked_points.max(initial=0)),
             "wall_s": self.wall_s,
         }
+
+
+def _tasks(results: Sequence[TickResult]) -> dict[str, Any]:
+    """What each level wanted and got, as the log has it."""
+    names = max((tuple(t.name for t in r.tasks) for r in results), key=len, default=())
+
+    def column(result: TickResult, form: Callable[[TaskResult], float]) -> list[float]:
+        return [form(task) for task in result.tasks] or [0.0] * len(names)
+
+    def table(form: Callable[[TaskResult], float]) -> Array:
+        return np.array([column(r, form) for r in results]).reshape(len(results), len(names))
+
+    return {
+        "task_names": names,
+        "task_activation": table(lambda t: max(t.activation, default=0.0)),
+        "task_rate": table(lambda t: math.hypot(*t.rate)),
+        "task_residual": table(
+            lambda t: math.hypot(*(a * r for a, r in zip(t.activation, t.residual, strict=True)))
+        ),
+    }
 
 
 def final_ticks(elapsed: Array) -> NDArray[np.bool_]:

@@ -54,3 +54,4 @@ class Kind:
     captions: Callable[[Summary], dict[str, str]]  # of the same files
     worst: Callable[[pl.DataFrame], list[str]]  # keys of trials, the worst first
     pages: Callable[[Summary], dict[str, str]] | None = None  # further text, by file
+    runs: int = 100  # where nothing else is wished for

@@ -25,6 +25,26 @@ struct SurfacePoint {
 /// and some 30 ms where a cloud is made to be slow.
 inline constexpr std::int64_t kSearchSteps = 500'000;
 
+/// Storage for searches between two surfaces, made at set-up, and what they may still take: with it
+/// a search allocates nothing and its work is bounded.
+class PairSearch {
+ public:
+  PairSearch();
+  ~PairSearch();
+  PairSearch(PairSearch&&) noexcept;
+  PairSearch& operator=(PairSearch&&) noexcept;
+
+  std::int64_t steps = kSearchSteps;  ///< pairs of subtrees still to be looked at, counted down
+  /// The last answer is one: the search was cut short. Its witness points are the nearest found so
+  /// far, NaN for none.
+  bool lower_bound = false;
+
+ private:
+  friend class MeshTree;
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
 /// Surface of one rigid link: indexed once, queried every tick.
 ///
 /// All of it is in the link frame L, so moving the arm never rebuilds it: bring the cloud to L.
@@ -81,8 +101,10 @@ class MeshTree {
   /// @param T_LO   pose of the other link's frame in this one
   /// @param bound  only surface nearer than this counts; infinity is returned past it [m]
   /// @param[out] on_this_L, on_other_L  the two witness points, where given
+  /// @param search  without it the search allocates and goes on to its end
   double distance(const MeshTree& other, const Pose& T_LO, double bound = kInfinity,
-                  Vector3* on_this_L = nullptr, Vector3* on_other_L = nullptr) const;
+                  Vector3* on_this_L = nullptr, Vector3* on_other_L = nullptr,
+                  PairSearch* search = nullptr) const;
 
   /// @name CGAL's AABB tree, literally; these allocate.
   /// @{

@@ -1,6 +1,9 @@
 #pragma once
 #include <span>
+#include <string>
+#include <utility>
 #include <variant>
+#include <vector>
 
 #include "proxcgal/robot.hpp"
 #include "proxcgal/types.hpp"
@@ -57,15 +60,30 @@ struct Manipulability {
   double gain = 0.1;     ///< [1/s]
   int first_joint = 0;   ///< of the arm: 6 on the second arm of a 12-joint robot
   int joints = 0;        ///< of the arm; 0 takes all from `first_joint` on
+  double unit = 1.0;     ///< mu is counted in it: 1, or the arm's own maximum
   void validate() const;
 };
 
-using TaskSpec = std::variant<Avoidance, Reach, JointLimits, MinimumAltitude, Manipulability>;
+/// Keep links off one another: rows for the nearest pairs of links. The same law as avoidance, the
+/// other link in the obstacle's place; ours, as the thesis has no formula for it.
+struct SelfCollision {
+  double d_min = 0.05;   ///< [m] distance to keep
+  double buffer = 0.05;  ///< [m] the activation rises from 0 to 1 inside it
+  double gain = 2.0;     ///< [1/s]
+  int nearest = 3;       ///< this many nearest pairs, one row each
+  /// Names of the links that are watched; empty: all that more than one joint moves apart.
+  std::vector<std::pair<std::string, std::string>> pairs;
+  void validate() const;
+};
+
+using TaskSpec =
+    std::variant<Avoidance, Reach, JointLimits, MinimumAltitude, Manipulability, SelfCollision>;
 const char* task_name(const TaskSpec& spec);
 /// @throws ConfigError  with the field, its value and its bounds
 void validate(const TaskSpec& spec);
-/// What only shows on a robot: manipulability needs six joints, inside the robot's own.
-/// @throws ConfigError
+/// What only shows on a robot: manipulability needs six joints, inside the robot's own;
+/// self-collision links that exist.
+/// @throws ConfigError, ModelError
 void validate(const TaskSpec& spec, const Robot& robot);
 
 /// One (control point, obstacle point) pair that avoidance acts on.
@@ -77,6 +95,14 @@ struct ControlPair {
   double distance = kInfinity;  ///< [m] negative where the obstacle is inside: turns the normal
   /// Unit, from obstacle to robot: taken where the points coincide and leave none; zero for none.
   Vector3 fallback_normal_W = Vector3::Zero();
+};
+
+/// Two links of the robot and where they are nearest.
+struct LinkPair {
+  int a = -1, b = -1;
+  Vector3 on_a_W = Vector3::Zero(), on_b_W = Vector3::Zero();
+  double distance = kInfinity;                  ///< [m] 0 where they cross
+  Vector3 fallback_normal_W = Vector3::Zero();  ///< unit, from b to a: taken where they cross
 };
 
 /// A scalar row of a smaller norm is left as it is: scaling would blow up its rate, and the
@@ -114,8 +140,15 @@ void build_minimum_altitude(const MinimumAltitude& spec, const Robot& robot, con
 /// slope of one of its sides.
 void build_manipulability(const Manipulability& spec, const Robot& robot, const Posture& posture,
                           BuiltTask& out);
+/// Row n'(J_a - J_b) at each pair's nearest points, n from link b to link a; rate
+/// gain (d_min + buffer - d).
+/// @param pairs  the nearest first; one row each, at most kMaxRows
+void build_self_collision(const SelfCollision& spec, const Robot& robot, const Posture& posture,
+                          std::span<const LinkPair> pairs, BuiltTask& out);
 /// @}
 
+/// n'(J_a - J_b) of two links, (n,): the rate at which they part, by the joints' velocities.
+JointVector parting_row(const Robot& robot, const Posture& posture, const LinkPair& pair);
 /// n'J_lin of a pair, (n,): the rate at which its distance opens, by the joints' velocities.
 JointVector opening_row(const Robot& robot, const Posture& posture, const ControlPair& pair);
 /// Its norm: how well joints can open it.

@@ -1,0 +1,469 @@
+"""Goals for the 12-joint robot: sent, followed, cancelled, preempted; one end to each.
+
+The arm is simulated: it follows its velocity commands exactly, under the scenario's controller on
+points of the scene itself. Source: [JR] 3.2.1 (action server) and 4.1 (goals).
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+import time as clock
+from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import TracebackType
+from typing import Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxcgal import _core
+from proxcgal.errors import ConfigError, ProxError
+from proxcgal.models import Robot
+from proxcgal.sim import frames
+from proxcgal.sim.arms import tool_jacobian
+from proxcgal.sim.finish import Ending, GoalWatch, Outcome, pose_errors
+from proxcgal.sim.holding import concluded
+from proxcgal.sim.scenario import load_scenario
+from proxcgal.sim.scenario_joint import JointScenario
+from proxcgal.sim.setup import Setup, posture_problems
+from proxcgal.sim.ticks import Tick, TickInput, TickResult, TickTruth
+
+Array = NDArray[np.float64]
+State = Literal["starting", "executing", "cancelling", "succeeded", "aborted", "cancelled"]
+
+FRAMES = ("kuka_base", "end_effector")
+AT_REST = 1e-3  # [rad/s] of every joint
+STOPPED_AFTER = 3.0  # [s] a cancelled goal has ended, whatever avoidance still moves
+KEPT_RESULTS = 1000  # the oldest are forgotten
+
+
+class GoalRefusedError(ProxError):
+    """A goal that is not taken on, with every reason; nothing has moved."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointGoal:
+    """Where the tool is to go, as [JR] 3.2.1 and 4.1 have it."""
+
+    translation: Sequence[float]  # [m] (3,) r of (4.1)
+    rpy: Sequence[float] | None = None  # [rad] roll, pitch, yaw; None: orientation kept
+    frame: str = "kuka_base"  # that both are given in: kuka_base or end_effector
+    init: str = ""  # configuration to begin from; "": where the arm stands
+
+
+@dataclass(frozen=True, slots=True)
+class GoalFeedback:
+    """How a goal is doing."""
+
+    goal: int
+    state: State
+    time_s: float  # since it was taken on
+    linvel_norm: float  # [m/s] of the tool
+    angvel_norm: float  # [rad/s]
+    position_error_m: float
+    angle_error_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class GoalResult:
+    """How a goal ended."""
+
+    goal: int
+    outcome: Outcome
+    reason: str
+    time_s: float
+    position_error_m: float
+    angle_error_rad: float
+
+
+@dataclass(slots=True)
+class _Active:
+    number: int
+    goal: JointGoal
+    begun: float
+    T_WT: Array | None = None  # of the goal, once the arm stands where it begins
+    watch: GoalWatch | None = None
+    state: State = "starting"
+    cancelled: float = math.inf  # [s] when
+
+
+class JointRobotServer:
+    """Takes goals one after another; every goal that it takes ends exactly once.
+
+    Without `start` nothing moves by itself: each `step` is one tick. With it a thread makes them in
+    real time; every method may be called from any thread.
+    """
+
+    def __init__(
+        self,
+        scenario: str | Path | JointScenario = "joint_free",
+        overrides: Sequence[str] = (),
+        *,
+        second: Literal["preempt", "refuse"] = "preempt",
+        robot: Robot | None = None,
+    ) -> None:
+        """Sets the robot up in the first initial configuration of the scenario.
+
+        Args:
+            scenario: of kind `joint`: robot, obstacles, tasks, configurations, tolerances.
+            overrides: `key.sub=value`, applied after the file.
+            second: what a goal does while another is executed.
+            robot: the scenario's, where it is loaded already.
+
+        Raises:
+            ConfigError: another kind of scenario, or what does not fit.
+        """
+        if not isinstance(scenario, JointScenario):
+            loaded = load_scenario(scenario, overrides)
+            if not isinstance(loaded, JointScenario):
+                raise ConfigError(f"scenario {loaded.name}: kind = {loaded.kind!r}; needs 'joint'")
+            scenario = loaded
+        if second not in ("preempt", "refuse"):
+            raise ConfigError(f"second = {second!r}: must be 'preempt' or 'refuse'")
+        self._second = second
+        self._lock = threading.RLock()
+        self._setup = Setup.of(scenario, robot)
+        self._cloud = self._setup.known_cloud()
+        self._q = self._setup.q0.copy()
+        self._qd = np.zeros_like(self._q)
+        self._time = 0.0
+        self._ticks = 0
+        self._count = 0
+        self._active: _Active | None = None
+        self._results: OrderedDict[int, GoalResult] = OrderedDict()
+        self._last: TickResult | None = None
+        self._reach = reach_of(self._setup.robot)
+        self._law = self._made()
+        self._held = np.asarray(self._setup.robot.tool_pose(self._q))
+        self._thread: threading.Thread | None = None
+        self._ending = threading.Event()
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self._setup.robot
+
+    @property
+    def q(self) -> Array:
+        """(n_q,) where the arm stands."""
+        with self._lock:
+            return self._q.copy()
+
+    @property
+    def period(self) -> float:
+        """[s] from tick to tick."""
+        return float(self._law.config.period)
+
+    @property
+    def tasks(self) -> tuple[str, ...]:
+        """The tasks that run, the most important first."""
+        return self._setup.scenario.controller.levels
+
+    def set_tasks(self, tasks: Sequence[str], off: Sequence[str] = ()) -> None:
+        """Another stack, order or choice of tasks, by name, from the next goal on.
+
+        Args:
+            tasks: names of tasks or stacks, in order of priority.
+            off: of these, what is left out.
+
+        Raises:
+            ConfigError: an unknown name, or a goal is being executed.
+        """
+        from proxcgal.sim.scenario import change_scenario
+
+        with self._lock:
+            if self._active is not None:
+                raise ConfigError(f"tasks: goal {self._active.number} is being executed")
+            changes = [f"controller.{k}={list(v)!r}" for k, v in (("tasks", tasks), ("off", off))]
+            changed = change_scenario(self._setup.scenario, "tasks", changes)
+            self._setup = replace(self._setup, scenario=changed)
+            self._law = self._made()
+
+    def send_goal(self, goal: JointGoal) -> int:
+        """Takes a goal on, or says why not; nothing has moved when this returns.
+
+        Returns:
+            The goal's number.
+
+        Raises:
+            GoalRefusedError: not finite, an unknown frame or configuration, one that violates a
+                joint limit, out of reach, another goal executed (where that refuses).
+        """
+        with self._lock:
+            problems = self._problems(goal)
+            if problems:
+                raise GoalRefusedError("\n".join(problems))
+            self._count += 1
+            if self._active is not None:
+                self._end("cancelled", f"preempted by goal {self._count}")
+            self._active = _Active(self._count, goal, self._time)
+            if not goal.init:
+                self._begin(self._active)
+            return self._count
+
+    def cancel(self, number: int) -> bool:
+        """Brakes within limits; the goal has ended once the arm rests. False: it had ended."""
+        with self._lock:
+            active = self._active
+            if active is None or active.number != number or active.state == "cancelling":
+                return False
+            active.state, active.cancelled = "cancelling", self._time
+            return True
+
+    def step(self) -> None:
+        """One tick: the arm moves by its last command, and is given the next."""
+        with self._lock:
+            self._step()
+
+    def feedback(self) -> GoalFeedback | None:
+        """How the goal that is executed is doing; None where there is none."""
+        with self._lock:
+            if self._active is None:
+                return None
+            velocity = tool_jacobian(self.robot, self._q) @ self._qd
+            return GoalFeedback(
+                self._active.number, self._active.state, self._time - self._active.begun,
+                float(np.linalg.norm(velocity[:3])), float(np.linalg.norm(velocity[3:])),
+                *self._errors(self._active),
+            )  # fmt: skip
+
+    def result(self, number: int) -> GoalResult | None:
+        """How a goal ended; None while it has not, and for one that never was or is forgotten."""
+        with self._lock:
+            return self._results.get(number)
+
+    def wait(self, number: int, timeout: float = math.inf) -> GoalResult | None:
+        """The goal's end; steps until then where no thread does.
+
+        Args:
+            number: of the goal.
+            timeout: [s] of the arm's own time; past it None is returned.
+        """
+        begin = self._time
+        while (found := self.result(number)) is None and self._time - begin < timeout:
+            if self._active is None:
+                return self.result(number)
+            if self._thread is None:
+                self.step()
+            else:
+                clock.sleep(self.period)
+        return found
+
+    def reset(self) -> bool:
+        """Leaves a STOP of the monitor, once its cause is gone; no message of a client does."""
+        with self._lock:
+            return bool(self._law.reset())
+
+    def start(self) -> None:
+        """Makes the ticks in real time, in a thread, until `close`."""
+        if self._thread is None:
+            self._ending.clear()
+            self._thread = threading.Thread(target=self._spin, daemon=True)
+            self._thread.start()
+
+    def close(self) -> None:
+        """Ends the thread; a goal that is still executed is cancelled at once."""
+        self._ending.set()
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+        with self._lock:
+            if self._active is not None:
+                self._end("cancelled", "the server was closed")
+
+    def __enter__(self) -> Self:
+        """Itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Closes."""
+        self.close()
+
+    def _spin(self) -> None:
+        due = clock.monotonic()
+        while not self._ending.is_set():
+            self.step()
+            due = max(due + self.period, clock.monotonic() - 0.1)  # what is lost stays lost
+            self._ending.wait(max(due - clock.monotonic(), 0.0))
+
+    def _made(self) -> _core.Controller:
+        self._ticks, self._last = 0, None
+        return self._setup.make_controller("wb_known", len(self._cloud))
+
+    def _problems(self, goal: JointGoal) -> list[str]:
+        """Why a goal is not taken on, a line each."""
+        problems: list[str] = []
+        for name, values in (("translation", goal.translation), ("rpy", goal.rpy)):
+            if values is None and name == "rpy":
+                continue
+            if problem := _three(name, values):
+                problems.append(problem)
+        if goal.frame not in FRAMES:
+            problems.append(f"frame = {goal.frame!r}: must be one of {', '.join(FRAMES)}")
+        scenario = self._scenario
+        q = None
+        if goal.init:
+            q = scenario.configurations.get(goal.init)
+            if q is None:
+                problems.append(
+                    f"init = {goal.init!r}: there are {', '.join(scenario.configurations)}"
+                )
+            else:
+                outside = posture_problems(self.robot, q, goal.init)
+                problems += [f"init = {goal.init!r}: {line}" for line in outside]
+        if self._second == "refuse" and self._active is not None:
+            problems.append(f"goal {self._active.number} is being executed")
+        if self._last is not None and self._last.mode == _STOP:
+            problems.append("the monitor has stopped the arm; only a reset where it runs helps")
+        if problems:
+            return problems
+        start = self._q if q is None else np.array(q)
+        T_WT = goal_pose(goal, np.asarray(self.robot.tool_pose(start)))
+        base_W, farthest = self._reach
+        if (far := float(np.linalg.norm(T_WT[:3, 3] - base_W))) > farthest:
+            x, y, z = T_WT[:3, 3]
+            return [
+                f"translation: the tool would be at ({x:.3f}, {y:.3f}, {z:.3f}) m, {far:.3f} m "
+                f"from the first joint; no posture reaches beyond {farthest:.3f} m"
+            ]
+        return []
+
+    @property
+    def _scenario(self) -> JointScenario:
+        scenario = self._setup.scenario
+        assert isinstance(scenario, JointScenario)
+        return scenario
+
+    def _begin(self, active: _Active) -> None:
+        """The arm stands where the goal begins: from here on it is followed."""
+        T_WT = goal_pose(active.goal, np.asarray(self.robot.tool_pose(self._q)))
+        self._setup = replace(self._setup, goal=T_WT)
+        active.T_WT = T_WT
+        active.watch = GoalWatch(self._scenario.finish, T_WT)
+        active.state = "executing"
+
+    def _place(self, active: _Active) -> None:
+        """Puts the resting arm into the goal's configuration, as [JR] does with its simulation."""
+        self._q = np.array(self._scenario.configurations[active.goal.init])
+        self._qd = np.zeros_like(self._q)
+        self._law = self._made()
+        self._begin(active)
+
+    def _step(self) -> None:
+        period = self.period
+        self._q = self._q + self._qd * period
+        active = self._active
+        T_WT = np.asarray(self.robot.tool_pose(self._q))
+        if active is not None:
+            self._advance(active, T_WT)
+            active = self._active
+        moving = active is not None and active.state == "executing" and active.T_WT is not None
+        if active is not None and not moving:
+            self._held = T_WT  # nothing is asked of the tool: it comes to rest
+        goal = active.T_WT if moving and active is not None else self._held
+        cloud = self._cloud
+        points_W, now = cloud(self._time), self._ticks * period
+        velocity_W = None if cloud.still else cloud.velocities(self._time)
+        out = self._law.tick_known(now, self._q, points_W, goal, velocity_W)
+        self._ticks += 1
+        self._time += period
+        self._last = TickResult.of(out, 0, 0.0)
+        self._qd = self._last.qd
+
+    def _advance(self, active: _Active, T_WT: Array) -> None:
+        """Whether the goal ends before this tick, or can begin."""
+        resting = bool(np.abs(self._qd).max() <= AT_REST)
+        if active.state == "cancelling":
+            if resting or self._time - active.cancelled > STOPPED_AFTER:
+                self._end("cancelled", "cancelled by the client")
+        elif active.state == "starting":
+            if resting:
+                self._place(active)
+        elif self._last is not None and self._last.mode == _STOP:
+            found = ", ".join(sorted({f.reason for f in self._last.findings}))
+            self._end("aborted", f"the monitor stopped the arm: {found}")
+        elif active.watch is not None:
+            ending = active.watch(self._time - active.begun, T_WT)
+            if ending is not None:
+                self._conclude(ending, active)
+
+    def _conclude(self, ending: Ending, active: _Active) -> None:
+        if ending.outcome != "succeeded" and self._last is not None:
+            given = TickInput(time=self._time, q=self._q, goal=self._setup.goal, known=True)
+            last = Tick(given, self._last, TickTruth())
+            ending = concluded(self._setup, ending, last, self._cloud(self._time))
+        self._end(ending.outcome, ending.reason)
+        if ending.outcome == "succeeded" and active.T_WT is not None:
+            self._held = active.T_WT
+
+    def _end(self, outcome: Outcome, reason: str) -> None:
+        """The one place where a goal ends."""
+        active = self._active
+        assert active is not None
+        assert active.number not in self._results
+        self._held = np.asarray(self.robot.tool_pose(self._q))
+        self._results[active.number] = GoalResult(
+            active.number, outcome, reason, self._time - active.begun, *self._errors(active)
+        )
+        while len(self._results) > KEPT_RESULTS:
+            self._results.popitem(last=False)
+        self._active = None
+
+    def _errors(self, active: _Active) -> tuple[float, float]:
+        T_WT = np.asarray(self.robot.tool_pose(self._q))
+        goal = goal_pose(active.goal, T_WT) if active.T_WT is None else active.T_WT
+        return pose_errors(T_WT, goal)
+
+
+_STOP = 3  # mode
+
+
+def goal_pose(goal: JointGoal, T_WE: Array) -> Array:
+    """(4, 4) T_WT of a goal, the tool being at T_WE.
+
+    Source: [JR] (4.2) to (4.6); (4.6) forgets to rotate, so here it is r_ee + R_ee r_goal.
+    """
+    T_WT = np.eye(4)
+    turn = None if goal.rpy is None else frames.rotation(goal.rpy)  # (4.2)
+    if goal.frame == "kuka_base":
+        T_WT[:3, :3] = T_WE[:3, :3] if turn is None else turn  # (4.3)
+        T_WT[:3, 3] = goal.translation  # (4.5)
+    else:
+        T_WT[:3, :3] = T_WE[:3, :3] if turn is None else T_WE[:3, :3] @ turn  # (4.4)
+        T_WT[:3, 3] = T_WE[:3, 3] + T_WE[:3, :3] @ np.asarray(goal.translation)  # (4.6), mended
+    return T_WT
+
+
+def reach_of(robot: Robot) -> tuple[Array, float]:
+    """A point (3,) and the radius that the tool never leaves: the sum of all lengths after it."""
+    joints, frame = robot.description.joints, robot.description.tool_frame
+    length, row = float(np.linalg.norm(frame.T_JF[:3, 3])), frame.joint
+    while row >= 0 and joints[row].parent >= 0:
+        length += float(np.linalg.norm(joints[row].origin[:3, 3]))
+        if joints[row].type == "prismatic":
+            length += max(abs(joints[row].q_min), abs(joints[row].q_max))
+        row = joints[row].parent
+    return (np.zeros(3) if row < 0 else np.asarray(joints[row].origin)[:3, 3]), length
+
+
+def _three(name: str, values: object) -> str | None:
+    """Why these are not three finite numbers; None where they are."""
+    try:
+        if not isinstance(values, Sequence | np.ndarray) or isinstance(values, str):
+            raise TypeError
+        if len(values) != 3:
+            raise TypeError
+        if any(isinstance(value, bool | str) for value in values):
+            raise TypeError
+        finite = all(math.isfinite(value) for value in values)
+    except (TypeError, OverflowError):
+        return f"{name} = {str(values)[:80]}: must be three finite numbers"
+    return None if finite else f"{name} = {list(values)}: must be finite"

@@ -1,0 +1,119 @@
+"""Two robots' descriptions made one chain."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from proxcgal.errors import ModelError
+from proxcgal.models.description import Frame, Joint, Link, RobotDescription, listed
+from proxcgal.models.triangles import Floats
+
+
+def joined(
+    first: RobotDescription,
+    link: str,
+    second: RobotDescription,
+    pose: ArrayLike,
+    prefixes: tuple[str, str],
+) -> tuple[RobotDescription, list[int]]:
+    """One description out of two; its tool is the second's.
+
+    Args:
+        first: keeps its place; its joints come first.
+        link: the link, or named frame, of `first` that carries `second`.
+        second: hangs there by its base.
+        pose: (4, 4) of its base frame in that link's frame [m].
+        prefixes: put before the names of each one's joints, links and frames.
+
+    Returns:
+        The description, and for each of its links its row in those of `first` and then `second`.
+
+    Raises:
+        ModelError: no such link, a pose that is none, or names that are not unique in the end.
+    """
+    where = first.frame(link)
+    own = renamed(first, prefixes[0])
+    there = moved(second, where.T_JF @ rigid(pose, "pose"), where.joint, len(first.joints))
+    added = renamed(there, prefixes[1])
+    links = (*own.links, *added.links)
+    order = sorted(range(len(links)), key=lambda row: links[row].joint)
+    one = replace(
+        own,
+        name=f"{first.name}_{second.name}",
+        joints=(*own.joints, *added.joints),
+        links=tuple(links[row] for row in order),
+        frames=(*own.frames, *added.frames),
+        tool=added.tool,
+        source=f"{own.source} + {added.source}",
+    )
+    names: dict[str, Sequence[str]] = {
+        "joint": one.joint_names,
+        "link": one.link_names,
+        "frame": [frame.name for frame in one.frames],
+    }
+    for kind, all_names in names.items():
+        if twice := [name for name, count in Counter(all_names).items() if count > 1]:
+            raise ModelError(
+                f"attach with prefix {prefixes!r}: both robots have {kind} {listed(twice)}; a "
+                "prefix that sets them apart is needed"
+            )
+    return one, order
+
+
+def rigid(pose: ArrayLike, what: str) -> Floats:
+    """A (4, 4) rigid pose.
+
+    Raises:
+        ModelError: it is none.
+    """
+    T = np.asarray(pose, dtype=np.float64)
+    if T.shape != (4, 4) or not np.isfinite(T).all():
+        raise ModelError(f"{what} has shape {T.shape}; a finite (4, 4) pose is needed")
+    R = T[:3, :3]
+    turns = np.abs(R @ R.T - np.eye(3)).max() < 1e-6 and np.linalg.det(R) > 0
+    if not turns or (T[3] != [0, 0, 0, 1]).any():
+        raise ModelError(f"{what} is {T.tolist()}; a rotation and a translation are needed")
+    return T
+
+
+def renamed(description: RobotDescription, prefix: str) -> RobotDescription:
+    """The same robot with `prefix` before the names of its joints, links and frames."""
+
+    def name(part: Any) -> Any:
+        return replace(part, name=prefix + part.name)
+
+    return replace(
+        description,
+        joints=tuple(name(joint) for joint in description.joints),
+        links=tuple(name(link) for link in description.links),
+        frames=tuple(name(frame) for frame in description.frames),
+        tool=prefix + description.tool,
+    )
+
+
+def moved(description: RobotDescription, T_JB: Floats, joint: int, offset: int) -> RobotDescription:
+    """The robot hung on a joint of another: its rows shifted by `offset`, its base at T_JB."""
+
+    def row(own: int) -> int:
+        return joint if own < 0 else own + offset
+
+    def placed(own: int, pose: Floats) -> Floats:
+        return T_JB @ pose if own < 0 else pose
+
+    joints: list[Joint] = [
+        replace(j, parent=row(j.parent), origin=placed(j.parent, j.origin))
+        for j in description.joints
+    ]
+    links: list[Link] = [
+        replace(k, joint=row(k.joint), T_JL=placed(k.joint, k.T_JL)) for k in description.links
+    ]
+    frames: list[Frame] = [
+        replace(f, joint=row(f.joint), T_JF=placed(f.joint, f.T_JF)) for f in description.frames
+    ]
+    return replace(description, joints=tuple(joints), links=tuple(links), frames=tuple(frames))
