@@ -23,6 +23,7 @@ from proxcgal.sim.scenario_keys import (
     Skin,
 )
 from proxcgal.sim.scenario_law import Controller
+from proxcgal.sim.scenario_operator import Operator
 from proxcgal.sim.scenario_problems import lines
 from proxcgal.sim.scene import ObstacleScene, Scene
 
@@ -38,7 +39,7 @@ class Scenario(Section):
 
     name: str = Field("unnamed", description="left out in a file: the file's own name")
     description: str = Field("", description="one line, shown in lists")
-    kind: Literal["static"] = Field(description="what kind of scene this is")
+    kind: Literal["static", "hri"] = Field(description="what kind of scene this is")
     robot: str = Field(description="a built-in robot's name, or a path to .urdf or .xml")
     package_dirs: tuple[str, ...] = Field(
         (), description="where package:// paths of the robot's file are looked up"
@@ -69,8 +70,14 @@ class Scenario(Section):
         return toml.write(self.model_dump(by_alias=True))
 
 
+class HriScenario(Scenario):
+    """A person walks in and works beside the arm."""
+
+    operator: Operator
+
+
 #: The class of each `kind`.
-KINDS: dict[str, type[Scenario]] = {"static": Scenario}
+KINDS: dict[str, type[Scenario]] = {"static": Scenario, "hri": HriScenario}
 
 
 def list_scenarios() -> dict[str, str]:
