@@ -18,10 +18,12 @@ if TYPE_CHECKING:
 class Wishes:
     """What a user asks a campaign for."""
 
-    runs: int  # draws of each scene
+    runs: int  # draws of each scene, or subjects
     seed: int
     scenarios: tuple[str, ...] = ()  # names or files, instead of the kind's own
     overrides: tuple[str, ...] = ()  # `key.sub=value`, for all trials
+    controllers: tuple[str, ...] = ()  # instead of the kind's own
+    jitter: bool = True  # where the kind repeats its trials with moved positions
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
