@@ -27,7 +27,10 @@ if TYPE_CHECKING:
     from proxcgal.study.store import Outcome, Store
 
 #: Module that holds each kind as its `KIND`.
-KINDS = {"static": "proxcgal.study.static", "faults": "proxcgal.study.faults"}
+KINDS = {
+    "static": "proxcgal.study.static", "faults": "proxcgal.study.faults",
+    "hri": "proxcgal.study.hri",
+}
 if TYPE_CHECKING:
     KindName = str
 else:

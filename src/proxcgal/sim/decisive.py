@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+#: Round ticks that are asked in turn: beyond, their neighbours say more.
+NEAR_TICKS = 25
+
 
 @dataclass(frozen=True, slots=True)
 class DecisiveTruth:
@@ -55,8 +58,8 @@ def decisive_truth(
         tree = _core.MeshTree(*solid.core())
         for link in moving:
             apart.add(tree, int(link), T_OW[:, row] @ poses_W[:, link], solid.rounding)
-    apart.ask_least(under)
     apart.ask(np.flatnonzero(wanted))
+    apart.ask_least(under)
     own = _Pairs(surfaces, len(q))
     for a, b in surfaces.self_pairs:
         own.add(surfaces.trees[a], int(b), inverse(poses_W[:, a]) @ poses_W[:, b])
@@ -107,11 +110,14 @@ class _Pairs:
 
     def ask(self, ticks: NDArray[np.intp]) -> None:
         """Asks these ticks, unless they were."""
-        for tick in ticks:
-            if np.isnan(self.distance[tick]):
-                self._ask(int(tick))
+        if self.links:
+            for tick in ticks:
+                if np.isnan(self.distance[tick]):
+                    self._ask(int(tick), NEAR_TICKS)
 
-    def _ask(self, tick: int) -> None:
+    def _ask(self, tick: int, near: int | None = None) -> None:
+        """Asks one tick; what follows for so many ticks to either side, or for all, is noted."""
+        ticks = slice(None) if near is None else slice(max(tick - near, 0), tick + near + 1)
         best, nearest = np.inf, -1
         for row in np.argsort(self._at_least[:, tick]):
             if self._at_least[row, tick] >= best:
@@ -120,9 +126,9 @@ class _Pairs:
             other, T_AB = self._surfaces.trees[self.links[row]], self._T_AB[row][tick]
             found = solid_distance(self._trees[row], self._rounding[row], other, T_AB, bound)[0]
             distance = min(found, bound)
-            sweep = self._sweeps[row]
-            nearer = distance - moved(sweep[tick : tick + 1], sweep)
-            np.maximum(self._at_least[row], nearer, out=self._at_least[row])
+            sweep, known = self._sweeps[row], self._at_least[row, ticks]
+            nearer = distance - moved(sweep[tick : tick + 1], sweep[ticks])
+            np.maximum(known, nearer, out=known)
             if distance < best:
                 best, nearest = distance, int(row)
         self.distance[tick], self.nearest[tick] = best, nearest

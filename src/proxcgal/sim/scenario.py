@@ -12,6 +12,7 @@ from pydantic import Field, ValidationError
 from proxcgal.errors import ConfigError
 from proxcgal.models.paths import is_robot_file
 from proxcgal.sim import toml
+from proxcgal.sim.human.person import Person, person_of
 from proxcgal.sim.scenario_keys import (
     Fault,
     Goal,
@@ -25,7 +26,7 @@ from proxcgal.sim.scenario_keys import (
 from proxcgal.sim.scenario_law import Controller
 from proxcgal.sim.scenario_operator import Operator
 from proxcgal.sim.scenario_problems import lines
-from proxcgal.sim.scene import ObstacleScene, Scene
+from proxcgal.sim.scene import ObstacleScene, Scene, Together
 
 #: wb: whole body; sm: sensor points; wb_known: whole body on points of the scene itself; wb_memory:
 #: whole body that remembers what left the sensors' view.
@@ -62,7 +63,15 @@ class Scenario(Section):
     faults: tuple[Fault, ...] = Field((), alias="fault")
 
     def scene(self) -> Scene:
-        """What stands and moves beside the robot."""
+        """What stands and moves beside the robot and can be sensed."""
+        return ObstacleScene([obstacle for obstacle in self.obstacles if obstacle.sensed])
+
+    def measured(self) -> Scene:
+        """What true distances run to."""
+        return self.scene()
+
+    def drawn(self) -> Scene:
+        """All that is there."""
         return ObstacleScene(self.obstacles)
 
     def to_toml(self) -> str:
@@ -71,9 +80,39 @@ class Scenario(Section):
 
 
 class HriScenario(Scenario):
-    """A person walks in and works beside the arm."""
+    """A person walks in and works beside the arm; distances run to that person alone."""
 
     operator: Operator
+
+    def person(self) -> Person:
+        """Who works there.
+
+        Raises:
+            ConfigError: a recording that cannot be read; a place out of reach, or not in time.
+        """
+        return person_of(self.operator, self.duration)
+
+    def scene(self) -> Scene:
+        """The person, and what else can be sensed."""
+        return Together(self.person(), super().scene())
+
+    def measured(self) -> Scene:
+        """The person."""
+        return self.person()
+
+    def drawn(self) -> Scene:
+        """The person, and all that stands round."""
+        return Together(self.person(), super().drawn())
+
+    def windows(self) -> dict[str, tuple[float, float]]:
+        """Start and end of every phase that is reported, by name [s]."""
+        steps = self.operator.timeline
+        ends = [*(step.at for step in steps[1:]), self.duration]
+        return {
+            step.phase: (step.at, end)
+            for step, end in zip(steps, ends, strict=True)
+            if step.phase is not None
+        }
 
 
 #: The class of each `kind`.
@@ -147,6 +186,9 @@ def _anchor(table: dict[str, Any], folder: Path) -> None:
     robot = table.get("robot")
     if isinstance(robot, str) and is_robot_file(robot):
         table["robot"] = str((folder / robot).absolute())
+    operator = table.get("operator")
+    if isinstance(operator, dict) and isinstance(operator.get("recording"), str):
+        operator["recording"] = str((folder / operator["recording"]).absolute())
     places = table.get("package_dirs")
     if isinstance(places, list) and all(isinstance(place, str) for place in places):
         table["package_dirs"] = [str((folder / place).absolute()) for place in places]
