@@ -14,7 +14,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 import tyro.extras
 
-from proxcgal.apps.options import Flag, Number, Settings, checked_workers, flat
+from proxcgal.apps.options import (
+    ControllerName,
+    Flag,
+    Number,
+    Settings,
+    checked_workers,
+    flat,
+)
 from proxcgal.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -31,6 +38,7 @@ KINDS = {
     "static": "proxcgal.study.static", "faults": "proxcgal.study.faults",
     "hri": "proxcgal.study.hri",
 }
+RUNS, SUBJECTS = 100, 20  # unless told
 if TYPE_CHECKING:
     KindName = str
 else:
@@ -45,6 +53,8 @@ class CampaignOptions:
     with all controllers.
     faults: every fault of docs/reliability.md while the arm moves, on two robots: is the mode
     right, how soon, does the arm recover?
+    hri: virtual subjects at two assembly tasks beside the arm, every subject with all controllers,
+    then once more with all positions of the cell moved at random.
 
     Every finished trial is kept at once: the same command goes on where it was interrupted, and
     more --runs go on where fewer ended. Writes trials.parquet (a row a trial), summary.json,
@@ -54,13 +64,25 @@ class CampaignOptions:
       proxcgal campaign static --runs 100
       proxcgal campaign static --runs 20 --set controller.d_min=0.25 --out out/farther
       proxcgal campaign faults --runs 20
+      proxcgal campaign hri
+      proxcgal campaign hri --subjects 20 --controller wb sm --no-jitter
       proxcgal campaign static --runs 1000 --cluster tcp://10.0.0.1:8786
     """
 
     kind: Annotated[KindName, tyro.conf.Positional, tyro.conf.arg(metavar="|".join(KINDS))]
     """What is repeated."""
-    runs: Annotated[int, tyro.conf.arg(metavar="N")] = 100
-    """Draws of each scene, or runs of each fault and robot."""
+    runs: Annotated[
+        int | None, tyro.conf.arg(metavar="N", help_behavior_hint="(default: 100, hri: 20)")
+    ] = None
+    """Draws of each scene, runs of each fault and robot, or subjects."""
+    subjects: Number = None
+    """The same, as hri has it."""
+    controller: Annotated[
+        tuple[ControllerName, ...], tyro.conf.arg(metavar="wb|sm|wb_known ...", help_behavior_hint="")
+    ] = ()
+    """Of hri, some controllers instead of all."""
+    no_jitter: Flag = False
+    """Of hri, only the cell as it is."""
     seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
     """Fixes every random draw."""
     scenario: Annotated[
@@ -99,10 +121,11 @@ def campaign_command(options: CampaignOptions, command: str) -> int:
     from proxcgal.study.table import parquet, tidy
 
     begin = clock.monotonic()
-    workers, kept = checked_workers(options.workers), _kept(options)
+    workers, kept, runs = checked_workers(options.workers), _kept(options), _runs(options)
     wishes = Wishes(
-        runs=options.runs, seed=options.seed, scenarios=options.scenario,
-        overrides=tuple(flat(options.set)),
+        runs=runs, seed=options.seed, scenarios=options.scenario,
+        overrides=tuple(flat(options.set)), controllers=tuple(dict.fromkeys(options.controller)),
+        jitter=not options.no_jitter,
     )  # fmt: skip
     announce("drawing scenes (a robot's first time takes a while)", quiet=options.quiet)
     kind: Kind = import_module(KINDS[options.kind]).KIND
@@ -123,7 +146,7 @@ def campaign_command(options: CampaignOptions, command: str) -> int:
             recorded = keep_worst(chosen, folder, ticks, near, quiet=options.quiet)
         failed = [e for e in ended if e.outcome.error is not None]
         summary = {
-            "campaign": options.kind, "seed": options.seed, "runs": options.runs,
+            "campaign": options.kind, "seed": options.seed, "runs": runs,
             "trials": len(ended), "failed": [_failure(e) for e in failed],
             **kind.analyse(table, campaign), "worst": recorded,
         }  # fmt: skip
@@ -141,18 +164,37 @@ def campaign_command(options: CampaignOptions, command: str) -> int:
 
 
 def _kept(options: CampaignOptions) -> int:
-    """How many of the worst are recorded. Raises: ConfigError: also for the other numbers."""
+    """How many of the worst are recorded. Raises: ConfigError: also for the other options."""
     problems = []
-    form, _, count = options.keep.partition(":")
-    if options.keep != "none" and not (form == "worst" and count.isdecimal()):
+    form, _, kept = options.keep.partition(":")
+    if options.keep != "none" and not (form == "worst" and kept.isdecimal()):
         problems.append(f"--keep {options.keep}: must be worst:N, such as worst:5, or none")
-    if options.runs < 1:
-        problems.append(f"--runs {options.runs}: must be 1 or more")
+    for name in ("runs", "subjects"):
+        count = getattr(options, name)
+        if count is not None and count < 1:
+            problems.append(f"--{name} {count}: must be 1 or more")
+    if options.kind != "hri":
+        own = {
+            "subjects": options.subjects, "controller": options.controller,
+            "no-jitter": options.no_jitter,
+        }  # fmt: skip
+        problems += [
+            f"--{name}: goes with campaign hri, not with {options.kind}"
+            for name, value in own.items()
+            if value
+        ]
+    elif options.runs is not None and options.subjects is not None:
+        problems.append("--runs and --subjects say the same: give one of them")
     if options.seed < 0:
         problems.append(f"--seed {options.seed}: must be 0 or more")
     if problems:
         raise ConfigError("\n".join(problems))
-    return int(count or 0)
+    return int(kept or 0)
+
+
+def _runs(options: CampaignOptions) -> int:
+    usual = SUBJECTS if options.kind == "hri" else RUNS
+    return options.subjects or options.runs or usual
 
 
 def _packages() -> dict[str, str]:

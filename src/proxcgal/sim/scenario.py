@@ -74,6 +74,11 @@ class Scenario(Section):
         """All that is there."""
         return ObstacleScene(self.obstacles)
 
+    @property
+    def floor(self) -> float:
+        """Height of the floor in pictures [m]; sensors see none."""
+        return 0.0
+
     def to_toml(self) -> str:
         """The file that gives this scenario again, with every default written out."""
         return toml.write(self.model_dump(by_alias=True))
@@ -103,6 +108,11 @@ class HriScenario(Scenario):
     def drawn(self) -> Scene:
         """The person, and all that stands round."""
         return Together(self.person(), super().drawn())
+
+    @property
+    def floor(self) -> float:
+        """Height of the floor that the person stands on [m]; sensors see none."""
+        return self.operator.floor
 
     def windows(self) -> dict[str, tuple[float, float]]:
         """Start and end of every phase that is reported, by name [s]."""

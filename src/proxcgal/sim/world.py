@@ -104,12 +104,13 @@ class Hits:
 class World:
     """A robot's full-resolution links and a scene's solids, at one moment at a time."""
 
-    def __init__(self, robot: Robot, scene: Scene | None = None) -> None:
+    def __init__(self, robot: Robot, scene: Scene | None = None, floor: float = 0.0) -> None:
         """Builds both.
 
         Args:
             robot: its `full_mesh` gives what rays meet, its `link_poses` where.
             scene: solids in the base frame; left out: none.
+            floor: its height in pictures [m].
 
         Raises:
             SimulationError: MuJoCo refuses a mesh, with the link's name.
@@ -123,6 +124,7 @@ class World:
         mujoco.set_mju_user_warning(self._warnings.append)
         self._model = copy.copy(_compiled(robot, tuple(type(solid) for solid in solids)))
         self._data = mujoco.MjData(self._model)
+        self._model.geom_pos[self._model.geom("floor").id, 2] = floor
         self._shape(solids)
         self._renderers: dict[tuple[int, int], Any] = {}
         self._place_scene(0.0)

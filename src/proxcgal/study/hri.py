@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -85,7 +86,7 @@ def plan(wishes: Wishes) -> Campaign:
         "kind": "hri", "seed": wishes.seed, "scenarios": list(wishes.scenarios or SCENES),
         "set": list(wishes.overrides), **scenes,
     }  # fmt: skip
-    settings = trials[0].scenario.controller.model_dump(mode="json")
+    settings = _plain_settings(trials[0].scenario.controller.model_dump(mode="json"))
     return Campaign(
         description=description, trials=trials, perform=perform, columns=COLUMNS,
         notes={"redrawn": dict(sorted(redrawn.items())), "settings": settings},
@@ -95,6 +96,16 @@ def plan(wishes: Wishes) -> Campaign:
 def task_of(scenario: HriScenario) -> str:
     """The task's name in tables: "task1" of `hri_task1`."""
     return plain(scenario.name.removeprefix("hri_"))
+
+
+def _plain_settings(table: dict[str, Any]) -> dict[str, Any]:
+    """As JSON can have it: a bound that is off is null."""
+    return {
+        key: _plain_settings(value) if isinstance(value, dict)
+        else None if isinstance(value, float) and not np.isfinite(value)
+        else value
+        for key, value in table.items()
+    }  # fmt: skip
 
 
 def _operated(source: str, overrides: tuple[str, ...]) -> HriScenario:

@@ -45,7 +45,7 @@ def motion_picture(
     times = np.linspace(0.0, max(r.ticks[-1].given.time for r in recordings), FRAMES)
     seen = [snapshots(recording, times.tolist()) for recording in recordings]
     camera = camera_for(setup)
-    world = World(setup.robot, setup.scenario.drawn())
+    world = World(setup.robot, setup.scenario.drawn(), setup.scenario.floor)
     frames = []
     try:
         for row, moment in enumerate(zip(*seen, strict=True)):
