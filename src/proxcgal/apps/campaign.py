@@ -35,7 +35,8 @@ if TYPE_CHECKING:
 
 #: Module that holds each kind as its `KIND`.
 KINDS = {
-    "static": "proxcgal.study.static", "faults": "proxcgal.study.faults",
+    "static": "proxcgal.study.static",
+    "faults": "proxcgal.study.faults",
     "hri": "proxcgal.study.hri",
 }
 RUNS, SUBJECTS = 100, 20  # unless told
@@ -78,7 +79,8 @@ class CampaignOptions:
     subjects: Number = None
     """The same, as hri has it."""
     controller: Annotated[
-        tuple[ControllerName, ...], tyro.conf.arg(metavar="wb|sm|wb_known ...", help_behavior_hint="")
+        tuple[ControllerName, ...],
+        tyro.conf.arg(metavar="wb|sm|wb_known ...", help_behavior_hint=""),
     ] = ()
     """Of hri, some controllers instead of all."""
     no_jitter: Flag = False

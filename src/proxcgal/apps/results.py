@@ -81,7 +81,7 @@ def perform(
             ]
             summaries = []
             for plan, own in zip(plans, grouped, strict=True):
-                summaries.append(static_summary(own))
+                summaries.append(_summary(plan.scenario, own))
                 write_text(plan.folder / "scenario.toml", plan.scenario.to_toml())
                 write_json(plan.folder / "run.json", _about(plan, own, origin))
                 write_json(plan.folder / "summary.json", summaries[-1])
@@ -93,6 +93,22 @@ def perform(
     finally:
         remove_empty(made)
     return summaries
+
+
+def _summary(scenario: Scenario, logs: Sequence[TrialLog]) -> Summary:
+    """What `summary.json` says; beside a person, mean distances too."""
+    from proxcgal.sim.scenario import HriScenario
+    from proxcgal.study.phases import mean_distances
+
+    summary = static_summary(logs)
+    if isinstance(scenario, HriScenario):
+        summary["subject"] = scenario.operator.subject
+        for log in logs:
+            summary["controllers"][log.controller]["mean_m"] = {
+                phase: {"true": true, "seen": seen}
+                for phase, (true, seen) in mean_distances(log, scenario).items()
+            }
+    return summary
 
 
 def check(

@@ -114,6 +114,16 @@ class HriScenario(Scenario):
         """Height of the floor that the person stands on [m]; sensors see none."""
         return self.operator.floor
 
+    def signals(self) -> list[tuple[float, str]]:
+        """Time [s] and note of every signal of the timeline."""
+        return [(step.at, step.note) for step in self.operator.timeline]
+
+    @property
+    def on_the_left(self) -> bool:
+        """Does the person work on the arm's left?"""
+        step = self.operator.timeline[0]
+        return self.operator.marks[step.mark][1] > 0.0
+
     def windows(self) -> dict[str, tuple[float, float]]:
         """Start and end of every phase that is reported, by name [s]."""
         steps = self.operator.timeline

@@ -122,9 +122,7 @@ class Goal(Section):
         if sum(form is not None for form in forms) != 1:
             raise ValueError("needs exactly one of offset, position and waypoints")
         if self.offset is not None and self.rpy is not None:
-            raise ValueError(
-                "rpy goes with position and waypoints, offset keeps the orientation"
-            )
+            raise ValueError("rpy goes with position and waypoints, offset keeps the orientation")
         return self
 
 

@@ -85,11 +85,13 @@ class Together:
 
     def poses(self, time: float) -> Array:
         """(n, 4, 4) T_WO."""
-        return np.concatenate([scene.poses(time) for scene in self._scenes] or [np.empty((0, 4, 4))])
+        parts = [scene.poses(time) for scene in self._scenes]
+        return np.concatenate([np.empty((0, 4, 4)), *parts])
 
     def twists(self, time: float) -> Array:
         """(n, 6) in world: velocity of each origin [m/s], angular velocity [rad/s]."""
-        return np.concatenate([scene.twists(time) for scene in self._scenes] or [np.empty((0, 6))])
+        parts = [scene.twists(time) for scene in self._scenes]
+        return np.concatenate([np.empty((0, 6)), *parts])
 
 
 class KnownCloud:

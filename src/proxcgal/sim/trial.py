@@ -121,9 +121,7 @@ def _with_truth(
     ticks: Sequence[Tick], elapsed: Array, q: Array, setup: Setup, wanted: NDArray[np.bool_]
 ) -> list[Tick]:
     """The ticks with the true distances that are wanted or decide."""
-    asked = decisive_truth(
-        setup.robot, setup.measured, elapsed, q, wanted, under=TOO_CLOSE
-    )
+    asked = decisive_truth(setup.robot, setup.measured, elapsed, q, wanted, under=TOO_CLOSE)
     return [
         replace(tick, truth=TickTruth(float(distance), link, float(own), tick.truth.leaked))
         for tick, distance, link, own in zip(

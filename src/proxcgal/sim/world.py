@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxcgal.errors import SimulationError
-from proxcgal.sim.surfaces import Surfaces
 from proxcgal.sim.solids import Box, Capsule, Cylinder, Solid, Sphere
+from proxcgal.sim.surfaces import Surfaces
 
 
 def _off_screen_library() -> str:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from proxcgal.errors import ConfigError
 from proxcgal.sim.scenario import CONTROLLERS, HriScenario, load_scenario
 from proxcgal.sim.setup import Setup
-from proxcgal.sim.trial_log import NOTHING, TOO_CLOSE, TrialLog, sampled_ticks
+from proxcgal.sim.trial_log import TOO_CLOSE, TrialLog, sampled_ticks
 from proxcgal.study.campaign import Campaign, Trial, plain
 from proxcgal.study.hri_figures import figures
 from proxcgal.study.hri_numbers import analyse
@@ -21,11 +21,11 @@ from proxcgal.study.hri_words import captions, listings, verdicts
 from proxcgal.study.jobs import Report
 from proxcgal.study.kind import Kind, Wishes
 from proxcgal.study.layouts import draw_layout
+from proxcgal.study.phases import SAMPLES_HZ, mean_distances
 from proxcgal.study.store import Row, Series
 from proxcgal.study.trials import identity, robot_of, simulate
 
 SCENES = ("hri_task1", "hri_task2")
-SAMPLES_HZ = 15.0  # the sensors' rate: means of the true distance and all series are taken at it
 #: Of the ticks under 0.05 m: the human was in a blind spot where the cloud's nearest point was
 #: this much farther away than the human really was, or there was none.
 UNSEEN_M = 0.05
@@ -137,19 +137,14 @@ def numbers(log: TrialLog, scenario: HriScenario) -> Row:
     close = log.true_m < TOO_CLOSE
     seen = np.isfinite(log.seen_m)
     nearest = int(np.nanargmin(log.true_m))
-    windows = scenario.windows()
-    means = {}
-    for phase, (start, end) in windows.items():
-        inside = (log.elapsed >= start) & (log.elapsed < end)
-        means[phase] = [
-            _mean(log.true_m[inside & samples]), _mean(log.seen_m[inside & seen])
-        ]  # fmt: skip
+    means = mean_distances(log, scenario)
+    mean, seen_mean = means.pop("cycle")
     setup = Setup.of(scenario, robot_of(scenario))
     finite = bool(np.isfinite(log.qd).all() and np.isfinite(log.q).all())
     law = scenario.controller
     return {
-        "mean_m": _mean(log.true_m[samples]),
-        "seen_mean_m": _mean(log.seen_m[seen]),
+        "mean_m": mean,
+        "seen_mean_m": seen_mean,
         "empty_ticks": int((~seen).sum()),
         "ticks": len(log.elapsed),
         "true_min_m": summary["true_min_m"],
@@ -162,8 +157,8 @@ def numbers(log: TrialLog, scenario: HriScenario) -> Row:
         "finite": finite,
         "limits_kept": finite and _limits_kept(log, setup),
         "phase_means": json.dumps(means),
-        "windows": json.dumps(windows),
-        "signals": json.dumps([[step.at, step.note] for step in scenario.operator.timeline]),
+        "windows": json.dumps(scenario.windows()),
+        "signals": json.dumps(scenario.signals()),
         "d_min_m": law.d_min,
         "buffer_m": law.buffer,
         "true_m": _series(log.true_m[samples]),
@@ -186,10 +181,6 @@ def _limits_kept(log: TrialLog, setup: Setup) -> bool:
     )
 
 
-def _mean(values: NDArray[np.float64]) -> float | None:
-    return float(np.minimum(values, NOTHING).mean()) if len(values) else None
-
-
 def _series(values: NDArray[np.float64]) -> Series:
     """Tenths of a millimetre, or of a thousandth; None where there is nothing."""
     return [round(v, 4) if np.isfinite(v) else None for v in values.tolist()]
@@ -207,11 +198,11 @@ def worst(table: pl.DataFrame) -> list[str]:
 KIND = Kind(
     title="A human in the workspace",
     introduction="Virtual subjects walk in, fetch tools and assemble at a car door while the arm "
-    "goes back and forth before it. Every controller meets the same subjects with the same noise of "
-    "the sensors, once in the cell as it is and once with all its positions moved at random. wb "
-    "moves the nearest point of the whole arm, sm only the sensors' mounting points; wb_known is wb "
-    "on points of the human itself, the ceiling, not a result of ours. Engineering figures from a "
-    "simulation, not a certificate.",
+    "goes back and forth before it. Every controller meets the same subjects with the same noise "
+    "of the sensors, once in the cell as it is and once with all its positions moved at random. wb "
+    "moves the nearest point of the whole arm, sm only the sensors' mounting points; wb_known is "
+    "wb on points of the human itself, the ceiling, not a result of ours. Engineering figures from "
+    "a simulation, not a certificate.",
     plan=plan, analyse=analyse, listings=listings, verdicts=verdicts, figures=figures,
     captions=captions, worst=worst,
 )  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,11 +12,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from proxcgal.study.figures import COLOURS, DASHED, DPI, GREY, LEGEND, NAMES
+from proxcgal.study.figures import COLOURS, DASHED, DPI, GREY, LEGEND, NAMES, mark_signals
+from proxcgal.study.bootstrap import mean_interval
 from proxcgal.study.hri_numbers import (
     PAPER,
     SAMPLE_S,
-    mean_interval,
     paired_differences,
     phase_rows,
     series,
@@ -50,20 +50,10 @@ def _figure(width: float, height: float) -> Figure:
     return figure
 
 
-def _tidy(axes: Sequence[Axes]) -> None:
+def _tidy(axes: Iterable[Axes]) -> None:
     for ax in axes:
         ax.tick_params(labelsize=9)
         ax.spines[["top", "right"]].set_visible(False)
-
-
-def _signals(ax: Axes, text: str, *, told: bool) -> None:
-    for at, note in json.loads(text):
-        ax.axvline(at, color=GREY, linewidth=0.8, alpha=0.7)
-        if told:
-            ax.annotate(
-                note, (at, 1.0), xycoords=("data", "axes fraction"), xytext=(2, 2),
-                textcoords="offset points", fontsize=7.5, color=GREY, rotation=20, ha="left",
-            )  # fmt: skip
 
 
 def _trials(main: pl.DataFrame) -> Figure:
@@ -111,13 +101,12 @@ def _trial(axes: Any, trial: pl.DataFrame, name: str, letter: str) -> None:
     top.plot(time, seen, color=colour, linewidth=1.2)
     top.plot(time, true, color=colour, linewidth=1.2, linestyle=DASHED)
     top.set_ylim(0.0, _HIGHEST)
-    top.set_title(f"({letter}) {NAMES.get(name, name)}", loc="left", fontsize=10, pad=34)
+    top.set_title(f"({letter}) {NAMES.get(name, name)}", loc="left", fontsize=10)
     bottom.plot(time, series(trial, "activation")[0], color=colour, linewidth=1.2)
     bottom.set_ylim(-0.05, 1.08)
     bottom.set_xlim(0.0, time[-1])
     bottom.set_xlabel("time [s]", fontsize=10)
-    for ax in (top, bottom):
-        _signals(ax, trial["signals"][0], told=ax is top)
+    mark_signals((top, bottom), json.loads(trial["signals"][0]))
 
 
 def _cycles(main: pl.DataFrame) -> Figure:
@@ -132,15 +121,16 @@ def _cycles(main: pl.DataFrame) -> Figure:
             time = np.arange(true.shape[1]) * SAMPLE_S
             mean, spread = true.mean(axis=0), true.std(axis=0)
             colour = COLOURS.get(str(name), "black")
-            ax.plot(time, mean, color=colour, linewidth=1.4, label=NAMES.get(str(name), name))
+            label = NAMES.get(str(name), str(name))
+            ax.plot(time, mean, color=colour, linewidth=1.4, label=label)
             ax.fill_between(
                 time, mean - spread, mean + spread, color=colour, alpha=0.13, linewidth=0.0
             )
         ax.set_ylim(0.0, _HIGHEST)
         ax.set_xlim(0.0, time[-1])
-        ax.set_title(task, loc="left", fontsize=10, fontweight="bold", pad=34)
+        ax.set_title(task, loc="left", fontsize=10, fontweight="bold")
         ax.set_ylabel("true distance [m]", fontsize=10)
-        _signals(ax, own["signals"][0], told=True)
+        mark_signals((ax,), json.loads(own["signals"][0]))
     axes[-1].set_xlabel("time [s]", fontsize=10)
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), **LEGEND)

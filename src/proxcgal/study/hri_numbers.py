@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from typing import Any
 
 import numpy as np
 import polars as pl
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from proxcgal.study.analysis import SELF_LIMIT_M, Summary
 from proxcgal.study.bootstrap import mean_interval
 from proxcgal.study.campaign import Campaign
+from proxcgal.study.phases import SAMPLES_HZ
 
 Array = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ PAPER = {
 CLEAR = ("task2", "H3_first", "H3_second")
 BEHIND_MM = -5.0  # [mm] the paired interval's lower end must be above it there
 COMPARISONS = (("wb", "sm"), ("wb_memory", "sm"), ("wb_memory", "wb"), ("wb_known", "wb"))
-SAMPLE_S = 1.0 / 15.0
+SAMPLE_S = 1.0 / SAMPLES_HZ
 
 
 def analyse(table: pl.DataFrame, campaign: Campaign) -> Summary:
@@ -67,7 +67,9 @@ def _layout(table: pl.DataFrame) -> Summary:
         for phase, window in json.loads(own["windows"][0]).items()
     }
     first = {task: _cell(own, task) for task, own in by_task.items()}
-    second = {phase: _cell(by_task[task], phase, window) for (task, phase), window in phases.items()}
+    second = {
+        phase: _cell(by_task[task], phase, window) for (task, phase), window in phases.items()
+    }
     paired = {row: _paired(table, row) for row in phase_rows(table)}
     close = {
         str(name): int(part["too_close_ticks"].sum())
@@ -182,11 +184,11 @@ def held(layout: Summary) -> list[tuple[str, bool, str]]:
     for row in CLEAR:
         pair = layout["paired_mm"].get(row, {}).get("wb-sm")
         if pair is not None:
-            text = f"{pair['mean']:+.1f} mm, 95 % interval {pair['low']:+.1f} to {pair['high']:+.1f}"
-            found.append((f"{row}: wb >= sm", pair["mean"] >= 0.0, text))
-            found.append(
-                (f"{row}: interval above {BEHIND_MM:g} mm", pair["low"] > BEHIND_MM, text)
+            text = (
+                f"{pair['mean']:+.1f} mm, 95 % interval {pair['low']:+.1f} to {pair['high']:+.1f}"
             )
+            found.append((f"{row}: wb >= sm", pair["mean"] >= 0.0, text))
+            found.append((f"{row}: interval above {BEHIND_MM:g} mm", pair["low"] > BEHIND_MM, text))
     close = layout["too_close"]
     if {"wb", "sm"} <= close.keys():
         text = f"{close['wb']} against {close['sm']} ticks"

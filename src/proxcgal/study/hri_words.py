@@ -35,34 +35,72 @@ def listings(summary: Summary) -> list[Listing]:
                     "standard deviation over subjects at one time. Seen: filtered cloud to robot, "
                     "the paper's own measure; true: exact meshes against the human's exact "
                     "surface.",
-                    names=("controller", "row", "seen mean", "seen sigma", "paper mean",
-                           "paper sigma", "ours - paper", "true mean", "true sigma"),
+                    names=(
+                        "controller",
+                        "row",
+                        "seen mean",
+                        "seen sigma",
+                        "paper mean",
+                        "paper sigma",
+                        "ours - paper",
+                        "true mean",
+                        "true sigma",
+                    ),
                     units=("", "", "m", "m", "m", "m", "m", "m", "m"),
-                    rows=list(_table(numbers[table])), left=2,
-                )  # fmt: skip
+                    rows=list(_table(numbers[table])),
+                    left=2,
+                )
             )
         found.append(
             Listing(
                 caption=f"Paired over the subjects, true means; {where}. 95 % bootstrap interval "
                 "of the mean difference. The paper gives no intervals; its difference stands "
                 "beside.",
-                names=("row", "comparison", "pairs", "difference", "95 % from", "to", "above 0",
-                       "paper"),
+                names=(
+                    "row",
+                    "comparison",
+                    "pairs",
+                    "difference",
+                    "95 % from",
+                    "to",
+                    "above 0",
+                    "paper",
+                ),
                 units=("", "", "", "mm", "mm", "mm", "%", "mm"),
-                rows=list(_paired(numbers["paired_mm"])), left=2,
-            )  # fmt: skip
+                rows=list(_paired(numbers["paired_mm"])),
+                left=2,
+            )
         )
         found.append(
             Listing(
                 caption=f"Close calls; {where}. Too close: true distance under 0.05 m. Blind: "
                 "then the cloud's nearest point was more than 0.05 m farther away than the human, "
                 "or there was none.",
-                names=("controller", "trials", "too close", "ticks", "blind", "ticks", "least",
-                       "empty cloud", "held"),
-                units=("", "", "trials", "ticks", "trials", "ticks", "m", "% of ticks",
-                       "% of ticks"),
-                rows=list(_close(numbers["close_calls"])), left=1,
-            )  # fmt: skip
+                names=(
+                    "controller",
+                    "trials",
+                    "too close",
+                    "ticks",
+                    "blind",
+                    "ticks",
+                    "least",
+                    "empty cloud",
+                    "held",
+                ),
+                units=(
+                    "",
+                    "",
+                    "trials",
+                    "ticks",
+                    "trials",
+                    "ticks",
+                    "m",
+                    "% of ticks",
+                    "% of ticks",
+                ),
+                rows=list(_close(numbers["close_calls"])),
+                left=1,
+            )
         )
     names = list(summary["close_calls"])
     found.append(
@@ -70,13 +108,14 @@ def listings(summary: Summary) -> list[Listing]:
             caption="Settings: one set for all controllers. They differ in the control point "
             "alone (sm: the sensors' mounting points), in what they are given (wb_known: points "
             "of the human itself) and in what they remember (wb_memory).",
-            names=("setting", *names), units=("", *("" for _ in names)),
+            names=("setting", *names),
+            units=("", *("" for _ in names)),
             rows=[
                 (f"{key} [{unit}]" if unit else key, *(_setting(summary, key) for _ in names))
                 for key, unit in _SETTINGS
             ],
             left=1,
-        )  # fmt: skip
+        )
     )
     return found
 

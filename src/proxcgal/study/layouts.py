@@ -31,8 +31,9 @@ def draw_layout(
 ) -> Layout:
     """The cell that one subject works in.
 
-    Every coordinate of way points, marks, places and obstacles is moved by up to 0.1 m, uniformly
-    and each on its own. A cell in which the subject cannot do its task is drawn again.
+    Every coordinate of way points, marks, places and what is sensed beside the person is moved by
+    up to 0.1 m, uniformly and each on its own. A cell in which the subject cannot do its task
+    is drawn again.
 
     Args:
         base: the cell as it is.
@@ -77,7 +78,8 @@ def _moved(base: HriScenario, draw: np.random.Generator) -> list[str]:
         for key in sorted(places):
             assignments.append(f"operator.{table}.{key}={_shifted(places[key], draw)}")
     for row, obstacle in enumerate(base.obstacles):
-        assignments.append(f"obstacle.{row}.position={_shifted(obstacle.position, draw)}")
+        if obstacle.sensed:
+            assignments.append(f"obstacle.{row}.position={_shifted(obstacle.position, draw)}")
     return assignments
 
 

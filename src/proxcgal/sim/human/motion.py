@@ -16,7 +16,6 @@ from proxcgal.sim.human.stance import (
     HANGING,
     STEP,
     Stance,
-    grip,
     hip,
     reaching,
     shoulder,
@@ -191,9 +190,7 @@ def _swing(subject: Subject, plan: _Plan, begin: float, start: Array, end: Array
     return duration
 
 
-def _points(
-    subject: Subject, operator: Operator, plan: _Plan, start: Array, time: Array
-) -> Array:
+def _points(subject: Subject, operator: Operator, plan: _Plan, start: Array, time: Array) -> Array:
     """(n, POINTS, 3) of the whole plan [m]."""
     n = len(time)
     body = np.tile(start, (n, 1))
@@ -235,9 +232,7 @@ def _arm(subject: Subject, plan: _Plan, time: Array) -> Array:
         envelope = minimum_jerk(passed / 1.0) * minimum_jerk(left / 1.0)
         angle = 2.0 * np.pi * WORK_HZ * passed
         round_T = np.stack([np.zeros_like(angle), np.sin(angle), np.cos(angle)], axis=1)
-        arm[inside] = reaching(
-            subject, plan.side, place_T + WORK_M * envelope[:, None] * round_T
-        )
+        arm[inside] = reaching(subject, plan.side, place_T + WORK_M * envelope[:, None] * round_T)
     return arm
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +22,8 @@ def minimum_jerk(share: Array) -> Array:
 
 def least_duration(length: float, speed: float, acceleration: float) -> float:
     """Of a minimum-jerk motion that keeps both bounds [s]."""
-    return max(PEAK_SPEED * length / speed, np.sqrt(PEAK_ACCELERATION * length / acceleration))
+    by_speed = PEAK_SPEED * length / speed
+    return max(by_speed, math.sqrt(PEAK_ACCELERATION * length / acceleration))
 
 
 @dataclass(frozen=True, slots=True)
