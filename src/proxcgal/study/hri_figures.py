@@ -12,8 +12,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from proxcgal.study.figures import COLOURS, DASHED, DPI, GREY, LEGEND, NAMES, mark_signals
 from proxcgal.study.bootstrap import mean_interval
+from proxcgal.study.figures import COLOURS, DASHED, DPI, GREY, LEGEND, NAMES, mark_signals
 from proxcgal.study.hri_numbers import (
     PAPER,
     SAMPLE_S,
@@ -60,7 +60,7 @@ def _trials(main: pl.DataFrame) -> Figure:
     """[WA] Fig. 9: a trial with the baseline and one with the whole body."""
     task = main["task"].unique(maintain_order=True).to_list()[-1]
     own = main.filter(pl.col("task") == task)
-    subject = own["subject"].min()
+    subject = min(own["subject"].to_list())
     names = [n for n in ("sm", "wb") if n in own["controller"].to_list()]
     names = names or own["controller"].unique(maintain_order=True).to_list()[:2]
     figure = _figure(5.2 * len(names), 5.0)
