@@ -20,6 +20,7 @@ from proxcgal.sim.truth import AHEAD_M, solid_distance
 if TYPE_CHECKING:
     from proxcgal.models.robots import Robot
     from proxcgal.sim.scene import Scene
+    from proxcgal.sim.solids import Solid
 
 Array = NDArray[np.float64]
 
@@ -57,7 +58,7 @@ def decisive_truth(
     for row, solid in enumerate(scene.solids):
         tree = _core.MeshTree(*solid.core())
         for link in moving:
-            apart.add(tree, int(link), T_OW[:, row] @ poses_W[:, link], solid.rounding)
+            apart.add(tree, int(link), T_OW[:, row] @ poses_W[:, link], solid)
     apart.ask(np.flatnonzero(wanted))
     apart.ask_least(under)
     own = _Pairs(surfaces, len(q))
@@ -83,13 +84,20 @@ class _Pairs:
         self.distance = np.full(ticks, np.nan)
         self.nearest = np.full(ticks, -1)
 
-    def add(self, tree: _core.MeshTree, link: int, T_AB: Array, rounding: float = 0.0) -> None:
-        """A surface, rounded, and a link with its pose (n, 4, 4) in that surface's frame."""
+    def add(
+        self, tree: _core.MeshTree, link: int, T_AB: Array, solid: Solid | None = None
+    ) -> None:
+        """A surface, a solid's or a link's, and a link with its pose (n, 4, 4) in its frame."""
         self._trees.append(tree)
-        self._rounding.append(rounding)
+        self._rounding.append(0.0 if solid is None else solid.rounding)
         self._T_AB.append(T_AB)
         self._sweeps.append(self._surfaces.sweep(np.full(len(T_AB), link), T_AB))
-        self._at_least = np.pad(self._at_least, ((0, 1), (0, 0)))
+        at_least = np.zeros(len(T_AB))
+        if solid is not None:  # from the box round the solid to the ball round the link
+            outside = np.maximum(np.abs(self._sweeps[-1][:, :3]) - solid.extent, 0.0)
+            far = np.sqrt(np.einsum("ni,ni->n", outside, outside))
+            at_least = np.maximum(far - self._surfaces.radii[link], 0.0)
+        self._at_least = np.vstack([self._at_least, at_least])
         self.links.append(link)
 
     def ask_least(self, under: float) -> None:
