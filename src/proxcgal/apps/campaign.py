@@ -99,6 +99,8 @@ class CampaignOptions:
     """A dask.distributed scheduler, whose workers simulate instead; each with --nthreads 1."""
     keep: Annotated[str, tyro.conf.arg(metavar="worst:N|none")] = "worst:5"
     """Trials to record, in DIR/recordings: the ticks that brought scans, to step through."""
+    no_picture: Flag = False
+    """Leave the moving picture out, where the kind has one."""
     every_tick: Flag = False
     """Record every tick, so that `proxcgal replay FILE --set ...` can compute commands again."""
     out: Annotated[
@@ -112,6 +114,7 @@ class CampaignOptions:
 def campaign_command(options: CampaignOptions, command: str) -> int:
     """Runs what is unfinished; prints tables, what was kept, what failed, the report's path."""
     from proxcgal.apps.kept import keep_worst
+    from proxcgal.apps.moving import show_moving
     from proxcgal.apps.origin import origin
     from proxcgal.apps.progress import announce
     from proxcgal.apps.report import write_report
@@ -146,6 +149,8 @@ def campaign_command(options: CampaignOptions, command: str) -> int:
         ticks: RecordedTicks = "all" if options.every_tick else "scans"
         with nullcontext(pool) if options.cluster is None else Pool(workers) as near:
             recorded = keep_worst(chosen, folder, ticks, near, quiet=options.quiet)
+            if kind.shown is not None and not options.no_picture:
+                show_moving(kind.shown(campaign), folder, near, quiet=options.quiet)
         failed = [e for e in ended if e.outcome.error is not None]
         summary = {
             "campaign": options.kind, "seed": options.seed, "runs": runs,

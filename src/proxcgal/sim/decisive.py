@@ -84,9 +84,7 @@ class _Pairs:
         self.distance = np.full(ticks, np.nan)
         self.nearest = np.full(ticks, -1)
 
-    def add(
-        self, tree: _core.MeshTree, link: int, T_AB: Array, solid: Solid | None = None
-    ) -> None:
+    def add(self, tree: _core.MeshTree, link: int, T_AB: Array, solid: Solid | None = None) -> None:
         """A surface, a solid's or a link's, and a link with its pose (n, 4, 4) in its frame."""
         self._trees.append(tree)
         self._rounding.append(0.0 if solid is None else solid.rounding)

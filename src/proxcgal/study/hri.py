@@ -195,6 +195,17 @@ def worst(table: pl.DataFrame) -> list[str]:
     return order["key"].to_list()
 
 
+def shown(campaign: Campaign) -> list[Trial]:
+    """The first subject at the last task, as in `trials.png`, whole body and sensor points."""
+    last = campaign.trials[-1].tags["task"]
+    own = [
+        trial for trial in campaign.trials
+        if (trial.tags["task"], trial.tags["layout"], trial.tags["subject"]) == (last, "main", 1)
+    ]  # fmt: skip
+    pair = [trial for name in ("wb", "sm") for trial in own if trial.controller == name]
+    return pair or own[:1]
+
+
 KIND = Kind(
     title="A human in the workspace",
     introduction="Virtual subjects walk in, fetch tools and assemble at a car door while the arm "
@@ -204,5 +215,5 @@ KIND = Kind(
     "wb on points of the human itself, the ceiling, not a result of ours. Engineering figures from "
     "a simulation, not a certificate.",
     plan=plan, analyse=analyse, listings=listings, verdicts=verdicts, figures=figures,
-    captions=captions, worst=worst,
+    captions=captions, worst=worst, shown=shown,
 )  # fmt: skip

@@ -140,7 +140,7 @@ def _cycles(main: pl.DataFrame) -> Figure:
 def _subjects(main: pl.DataFrame) -> Figure:
     rows = phase_rows(main)
     names = main["controller"].unique(maintain_order=True).to_list()
-    figure = _figure(1.45 * len(rows) + 2.0, 3.9)
+    figure = _figure(max(1.45 * len(rows) + 2.0, 8.6), 3.9)
     ax = figure.subplots()
     _tidy((ax,))
     for place, row in enumerate(rows):

@@ -211,7 +211,7 @@ def verdicts(summary: Summary) -> list[str]:
 
 def captions(summary: Summary) -> dict[str, str]:
     """What the figures show."""
-    found = {
+    return {
         "trials.png": "The form of [WA] Fig. 9: least distance and activation of the avoidance "
         "over time, the same subject at the same task, (a) sensor points, (b) whole body. Solid: "
         "seen. Dashed: true. Vertical: the signals. Dotted: the thresholds between which the "
@@ -223,5 +223,7 @@ def captions(summary: Summary) -> dict[str, str]:
         "differences.png": "Paired differences of the true means, subject by subject (dots), with "
         "their mean and its 95 % bootstrap interval, in the cell as it is and in moved ones; "
         "crosses: the paper's difference.",
+        "motion.gif": "One of the trials, in motion: red, the filtered cloud; blue, points that "
+        "were taken for the arm itself and removed; green, the pair that the avoidance acts on; "
+        "axes, the way point that is due.",
     }
-    return found
