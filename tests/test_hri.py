@@ -160,6 +160,8 @@ def test_the_tables_are_those_of_the_trials(campaign: Any) -> None:
     pair = summary["paired_mm"]["task2"]["wb-sm"]
     assert pair["mean"] == pytest.approx(np.mean([20.0, 10.0, 20.0]))
     assert 9.9 < pair["low"] <= pair["mean"] <= pair["high"] < 20.1
+    least = summary["paired_least_mm"]["task2"]["wb-sm"]
+    assert least["mean"] == pytest.approx(np.mean([10.0, 5.0, 10.0]))
     assert summary["too_close"] == {"wb": 0, "sm": 9, "of_which_blind": 6}
     assert summary["jittered"]["table1"] == summary["table1"]
     assert summary["wall_s"] == pytest.approx(1.5 * 12)

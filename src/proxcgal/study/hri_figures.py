@@ -146,7 +146,7 @@ def _subjects(main: pl.DataFrame) -> Figure:
     for place, row in enumerate(rows):
         for at, name in enumerate(names):
             x = place + 0.8 * ((at + 0.5) / len(names) - 0.5)
-            values = np.array(list(subject_means(main, row, name).values()))
+            values = np.array(list(subject_means(main, row).get(name, {}).values()))
             spread = np.linspace(-0.05, 0.05, len(values))
             colour = COLOURS.get(name, "black")
             ax.plot(x + spread, values, ".", color=colour, markersize=4, alpha=0.55)
@@ -178,7 +178,7 @@ def _differences(done: pl.DataFrame) -> Figure:
     for place, row in enumerate(rows):
         for at, layout in enumerate(layouts):
             own = done.filter(pl.col("layout") == layout)
-            apart = paired_differences(own, row, "wb", "sm")
+            apart = paired_differences(subject_means(own, row), "wb", "sm")
             interval = mean_interval(apart)
             if interval is None:
                 continue

@@ -70,7 +70,8 @@ def _layout(table: pl.DataFrame) -> Summary:
     second = {
         phase: _cell(by_task[task], phase, window) for (task, phase), window in phases.items()
     }
-    paired = {row: _paired(table, row) for row in phase_rows(table)}
+    paired = {row: _paired(subject_means(table, row)) for row in phase_rows(table)}
+    least = {task: _paired(subject_least(table, task)) for task in tasks}
     close = {
         str(name): int(part["too_close_ticks"].sum())
         for (name,), part in table.group_by(["controller"], maintain_order=True)
@@ -80,6 +81,7 @@ def _layout(table: pl.DataFrame) -> Summary:
         "table1": first,
         "table2": second,
         "paired_mm": paired,
+        "paired_least_mm": least,
         "too_close": {**close, "of_which_blind": int(ours["blind_ticks"].sum())},
         "close_calls": {
             str(name): {
@@ -147,28 +149,39 @@ def phase_rows(table: pl.DataFrame) -> list[str]:
     return [*firsts["task"].to_list(), *phases]
 
 
-def subject_means(table: pl.DataFrame, row: str, controller: str) -> dict[int, float]:
-    """Mean true distance of each subject in a task or phase [m]."""
-    found = {}
-    own = table.filter(pl.col("controller") == controller)
-    columns = own.select("task", "subject", "mean_m", "phase_means").iter_rows()
-    for task, subject, mean, text in columns:
+Subjects = dict[str, dict[int, float]]  # a number of each subject [m], by controller
+
+
+def subject_means(table: pl.DataFrame, row: str) -> Subjects:
+    """Mean true distance in a task or phase."""
+    found: Subjects = {}
+    columns = ("controller", "subject", "task", "mean_m", "phase_means")
+    for controller, subject, task, mean, text in table.select(columns).iter_rows():
         value = mean if task == row else json.loads(text).get(row, [None])[0]
         if value is not None:
-            found[subject] = value
+            found.setdefault(controller, {})[subject] = value
     return found
 
 
-def paired_differences(table: pl.DataFrame, row: str, one: str, other: str) -> list[float]:
-    """Of the true means, over the subjects that both controllers met [mm]."""
-    first, second = (subject_means(table, row, name) for name in (one, other))
+def subject_least(table: pl.DataFrame, task: str) -> Subjects:
+    """Least true distance in a task."""
+    found: Subjects = {}
+    own = table.filter(pl.col("task") == task)
+    for controller, subject, least in own.select("controller", "subject", "true_min_m").iter_rows():
+        found.setdefault(controller, {})[subject] = least
+    return found
+
+
+def paired_differences(values: Subjects, one: str, other: str) -> list[float]:
+    """Over the subjects that both controllers met [mm]."""
+    first, second = values.get(one, {}), values.get(other, {})
     return [1000.0 * (first[s] - second[s]) for s in sorted(first.keys() & second.keys())]
 
 
-def _paired(table: pl.DataFrame, row: str) -> Summary:
+def _paired(values: Subjects) -> Summary:
     found = {}
     for one, other in COMPARISONS:
-        apart = paired_differences(table, row, one, other)
+        apart = paired_differences(values, one, other)
         interval = mean_interval(apart)
         if interval is not None:
             found[f"{one}-{other}"] = {
