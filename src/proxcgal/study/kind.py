@@ -55,9 +55,6 @@ class Kind:
     figures: Callable[[pl.DataFrame], dict[str, Figure]]  # by file
     captions: Callable[[Summary], dict[str, str]]  # of the same files
     worst: Callable[[pl.DataFrame], list[str]]  # keys of trials, the worst first
-<<<<<<< HEAD
     pages: Callable[[Summary], dict[str, str]] | None = None  # further text, by file
-=======
     # Trials of one scene to show side by side, in a moving picture; none where it is left out.
     shown: Callable[[Campaign], list[Trial]] | None = None
->>>>>>> 7cea66c (campaign hri: moving picture of one trial; changelog, readme)
