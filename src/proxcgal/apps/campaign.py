@@ -80,7 +80,7 @@ class CampaignOptions:
     """The same, as hri has it."""
     controller: Annotated[
         tuple[ControllerName, ...],
-        tyro.conf.arg(metavar="wb|sm|wb_known ...", help_behavior_hint=""),
+        tyro.conf.arg(metavar="wb|sm|wb_known|wb_memory ...", help_behavior_hint=""),
     ] = ()
     """Of hri, some controllers instead of all."""
     no_jitter: Flag = False

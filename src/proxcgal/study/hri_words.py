@@ -116,8 +116,11 @@ def listings(summary: Summary) -> list[Listing]:
             names=("setting", *names),
             units=("", *("" for _ in names)),
             rows=[
-                (f"{key} [{unit}]" if unit else key, *(_setting(summary, key) for _ in names))
-                for key, unit in _SETTINGS
+                *(
+                    (f"{key} [{unit}]" if unit else key, *(_setting(summary, key) for _ in names))
+                    for key, unit in _SETTINGS
+                ),
+                ("x_o of eq. (4)", *(_velocity(summary, name) for name in names)),
             ],
             left=1,
         )
@@ -174,6 +177,13 @@ def _close(calls: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
 def _setting(summary: Summary, key: str) -> str:
     value = summary["settings"][key]
     return " > ".join(value) if isinstance(value, list) else f"{value:g}"
+
+
+def _velocity(summary: Summary, name: str) -> str:
+    """Where a controller has the obstacle's velocity from."""
+    if name == "wb_known":
+        return "known"
+    return "estimated" if name in summary["settings"]["motion"]["controllers"] else "0"
 
 
 def verdicts(summary: Summary) -> list[str]:
