@@ -59,7 +59,7 @@ def test_the_medians_interval_is_that_of_scipy() -> None:
     values = np.random.default_rng(4).normal(100.0, 30.0, 80).tolist()
     interval = median_interval(values)
     assert interval is not None
-    assert interval.median == np.median(values)
+    assert interval.middle == np.median(values)
     oracle = stats.bootstrap(
         (values,), np.median, method="percentile", n_resamples=10_000, rng=1
     ).confidence_interval

@@ -11,7 +11,7 @@ from pydantic import BaseModel
 from proxcgal import _core
 from proxcgal.errors import ConfigError
 from proxcgal.sim import toml
-from proxcgal.sim.scenario import Scenario, list_scenarios, load_scenario, parse_scenario
+from proxcgal.sim.scenario import Scenario, kinds, list_scenarios, load_scenario, parse_scenario
 from proxcgal.sim.scenario_joint import JointScenario
 from proxcgal.sim.scenario_problems import models_in
 
@@ -158,18 +158,21 @@ def test_all_problems_are_told_at_once_one_line_each() -> None:
 
 
 @pytest.mark.parametrize("text", ["offset = [0, 0, 0]\nposition = [0, 0, 0]", ""])
-def test_goal_needs_exactly_one_of_offset_and_position(text: str) -> None:
+def test_goal_needs_exactly_one_form(text: str) -> None:
     (line,) = told(MINIMAL.replace("offset = [0.1, 0, 0]", text))
-    assert "exactly one of offset and position" in line
+    assert "exactly one of offset, position and waypoints" in line
 
 
 def test_unknown_kind_lists_those_that_exist() -> None:
-    (line,) = told(MINIMAL, "kind=hri")
-    assert line == "x.toml: override kind = \"hri\": must be 'static', 'walkthrough' or 'guided'"
+    (line,) = told(MINIMAL, "kind=maze")
+    assert line == (
+        "x.toml: override kind = \"maze\": must be 'static', 'hri', 'joint', 'walkthrough' or "
+        "'guided'"
+    )
 
 
 def test_unknown_name_lists_the_scenarios() -> None:
-    with pytest.raises(ConfigError, match=r"one of: front_plane, .*side_plane"):
+    with pytest.raises(ConfigError, match=r"one of: front_plane, .*hri_task1, .*side_plane"):
         load_scenario("front_plan")
 
 
@@ -252,7 +255,8 @@ def rows_of(model: type[BaseModel], path: str = "") -> list[str]:
 
 def test_every_key_is_documented_with_its_default() -> None:
     text = DOCS.read_text()
-    assert [row for row in rows_of(Scenario) if row not in text] == []
+    for kind in (Scenario, kinds()["hri"]):
+        assert [row for row in rows_of(kind) if row not in text] == []
     joint = (DOCS.parent / "joint_robot.md").read_text()
     own = [row for row in rows_of(JointScenario) if "`configurations`" not in row]
     assert [row for row in own if row not in text + joint] == []

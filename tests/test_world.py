@@ -18,7 +18,7 @@ from proxcgal.sim.setup import Setup
 from proxcgal.sim.source import SimulatedSource
 from proxcgal.sim.surfaces import ALWAYS_NEAR, Surfaces
 from proxcgal.sim.truth import Truth
-from proxcgal.sim.world import Arrow, Camera, Spheres, World
+from proxcgal.sim.world import Arrow, Camera, Spheres, World, mujoco
 
 Array = NDArray[np.float64]
 
@@ -63,19 +63,23 @@ def surface_of(obstacle: Obstacle) -> tuple[Array, NDArray[np.int32]]:
     return placed(obstacle.pose(), vertices_O), triangles
 
 
-def test_rays_hit_where_our_own_trees_say(ur10e: px.Robot, world: World) -> None:
+def test_rays_hit_where_mujoco_says(world: World) -> None:
+    """MuJoCo casts at the scene alone; here at links and scene, as it once did for every scan."""
     world.place(Q)
-    trees = [px.MeshTree(*surface) for surface in surfaces_in_world(ur10e, Q)]
     origins, directions = rays(2000)
     hits = world.cast(origins, directions[:, None])
     lengths, own = hits.length[:, 0], hits.robot[:, 0]
-    each = np.array([tree.first_hit(origins, directions) for tree in trees])
-    expected = each.min(axis=0)
-    found = np.isfinite(expected)
-    assert found.sum() > 300
-    np.testing.assert_array_equal(np.isfinite(lengths), found)
-    np.testing.assert_allclose(lengths[found], expected[found], atol=1e-6)
-    np.testing.assert_array_equal(own[found], each.argmin(axis=0)[found] < len(trees) - 1)
+    both, geom = np.array([1, 1, 0, 0, 0, 0], np.uint8), np.empty(1, np.int32)
+    found = np.empty((2000, 2))
+    for row, ray in enumerate(zip(origins, directions, strict=True)):
+        far = mujoco.mj_ray(world._model, world._data, *ray, both, True, -1, geom, None)
+        found[row] = far, world._model.geom_bodyid[geom[0]]
+    expected = np.where(found[:, 0] < 0.0, np.inf, found[:, 0])
+    hit = np.isfinite(expected)
+    assert hit.sum() > 300
+    np.testing.assert_array_equal(np.isfinite(lengths), hit)
+    np.testing.assert_allclose(lengths[hit], expected[hit], atol=1e-6)
+    np.testing.assert_array_equal(own[hit], found[hit, 1] <= 7)  # the links' bodies come first
 
 
 def test_a_robots_second_world_has_its_own_obstacles(ur10e: px.Robot, world: World) -> None:

@@ -14,7 +14,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 import tyro.extras
 
-from proxcgal.apps.options import Flag, Number, Settings, checked_workers, flat
+from proxcgal.apps.options import (
+    ControllerName,
+    Flag,
+    Number,
+    Settings,
+    checked_workers,
+    flat,
+)
 from proxcgal.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -32,6 +39,7 @@ KINDS = {
     "faults": "proxcgal.study.faults",
     "walkthrough": "proxcgal.study.walk",
     "joint": "proxcgal.study.joint",
+    "hri": "proxcgal.study.hri",
 }
 if TYPE_CHECKING:
     KindName = str
@@ -51,6 +59,8 @@ class CampaignOptions:
 
     walkthrough: random operators and paths guide the painting arm, a quarter of them within bounds;
     does the guard trip at once and on nothing else, how does the arm stop?
+    hri: virtual subjects at two assembly tasks beside the arm, every subject with all controllers,
+    then once more with all positions of the cell moved at random.
 
     Every finished trial is kept at once: the same command goes on where it was interrupted, and
     more --runs go on where fewer ended. Writes trials.parquet (a row a trial), summary.json,
@@ -61,14 +71,25 @@ class CampaignOptions:
       proxcgal campaign static --runs 20 --set controller.d_min=0.25 --out out/farther
       proxcgal campaign faults --runs 20
       proxcgal campaign walkthrough --runs 200
+      proxcgal campaign hri
+      proxcgal campaign hri --subjects 20 --controller wb sm --no-jitter
       proxcgal campaign static --runs 1000 --cluster tcp://10.0.0.1:8786
     """
 
     kind: Annotated[KindName, tyro.conf.Positional, tyro.conf.arg(metavar="|".join(KINDS))]
     """What is repeated."""
     runs: Number = None
-    """Draws of each scene, runs of each fault and robot, or sensed runs of each joint scene and
-    start; left out: 100, joint 5."""
+    """Draws of each scene, runs of each fault and robot, sensed runs of each joint scene and start,
+    or subjects; left out: 100, joint 5, hri 20."""
+    subjects: Number = None
+    """The same, as hri has it."""
+    controller: Annotated[
+        tuple[ControllerName, ...],
+        tyro.conf.arg(metavar="wb|sm|wb_known|wb_memory ...", help_behavior_hint=""),
+    ] = ()
+    """Of hri, some controllers instead of all."""
+    no_jitter: Flag = False
+    """Of hri, only the cell as it is."""
     seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
     """Fixes every random draw."""
     scenario: Annotated[
@@ -83,6 +104,8 @@ class CampaignOptions:
     """A dask.distributed scheduler, whose workers simulate instead; each with --nthreads 1."""
     keep: Annotated[str, tyro.conf.arg(metavar="worst:N|none")] = "worst:5"
     """Trials to record, in DIR/recordings: the ticks that brought scans, to step through."""
+    no_picture: Flag = False
+    """Leave the moving picture out, where the kind has one."""
     every_tick: Flag = False
     """Record every tick, so that `proxcgal replay FILE --set ...` can compute commands again."""
     out: Annotated[
@@ -96,6 +119,7 @@ class CampaignOptions:
 def campaign_command(options: CampaignOptions, command: str) -> int:
     """Runs what is unfinished; prints tables, what was kept, what failed, the report's path."""
     from proxcgal.apps.kept import keep_worst
+    from proxcgal.apps.moving import show_moving
     from proxcgal.apps.origin import origin
     from proxcgal.apps.progress import announce
     from proxcgal.apps.report import write_report
@@ -109,10 +133,12 @@ def campaign_command(options: CampaignOptions, command: str) -> int:
     begin = clock.monotonic()
     workers, kept = checked_workers(options.workers), _kept(options)
     kind: Kind = import_module(KINDS[options.kind]).KIND
-    runs = kind.runs if options.runs is None else options.runs
+    given = options.runs if options.subjects is None else options.subjects
+    runs = kind.runs if given is None else given
     wishes = Wishes(
         runs=runs, seed=options.seed, scenarios=options.scenario,
-        overrides=tuple(flat(options.set)),
+        overrides=tuple(flat(options.set)), controllers=tuple(dict.fromkeys(options.controller)),
+        jitter=not options.no_jitter,
     )  # fmt: skip
     announce("drawing scenes (a robot's first time takes a while)", quiet=options.quiet)
     campaign = kind.plan(wishes)
@@ -130,6 +156,8 @@ def campaign_command(options: CampaignOptions, command: str) -> int:
         ticks: RecordedTicks = "all" if options.every_tick else "scans"
         with nullcontext(pool) if options.cluster is None else Pool(workers) as near:
             recorded = keep_worst(chosen, folder, ticks, near, quiet=options.quiet)
+            if kind.shown is not None and not options.no_picture:
+                show_moving(kind.shown(campaign), folder, near, quiet=options.quiet)
         failed = [e for e in ended if e.outcome.error is not None]
         summary = {
             "campaign": options.kind, "seed": options.seed, "runs": runs,
@@ -150,18 +178,32 @@ def campaign_command(options: CampaignOptions, command: str) -> int:
 
 
 def _kept(options: CampaignOptions) -> int:
-    """How many of the worst are recorded. Raises: ConfigError: also for the other numbers."""
+    """How many of the worst are recorded. Raises: ConfigError: also for the other options."""
     problems = []
-    form, _, count = options.keep.partition(":")
-    if options.keep != "none" and not (form == "worst" and count.isdecimal()):
+    form, _, kept = options.keep.partition(":")
+    if options.keep != "none" and not (form == "worst" and kept.isdecimal()):
         problems.append(f"--keep {options.keep}: must be worst:N, such as worst:5, or none")
-    if options.runs is not None and options.runs < 1:
-        problems.append(f"--runs {options.runs}: must be 1 or more")
+    for name in ("runs", "subjects"):
+        count = getattr(options, name)
+        if count is not None and count < 1:
+            problems.append(f"--{name} {count}: must be 1 or more")
+    if options.kind != "hri":
+        own = {
+            "subjects": options.subjects, "controller": options.controller,
+            "no-jitter": options.no_jitter,
+        }  # fmt: skip
+        problems += [
+            f"--{name}: goes with campaign hri, not with {options.kind}"
+            for name, value in own.items()
+            if value
+        ]
+    elif options.runs is not None and options.subjects is not None:
+        problems.append("--runs and --subjects say the same: give one of them")
     if options.seed < 0:
         problems.append(f"--seed {options.seed}: must be 0 or more")
     if problems:
         raise ConfigError("\n".join(problems))
-    return int(count or 0)
+    return int(kept or 0)
 
 
 def _packages() -> dict[str, str]:

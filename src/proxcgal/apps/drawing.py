@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from proxcgal.errors import SimulationError
+from proxcgal.sim.scenario import HriScenario
 from proxcgal.study.analysis import write_bytes
 
 if TYPE_CHECKING:
@@ -27,7 +28,8 @@ def draw_figures(scenario: Scenario, logs: Sequence[TrialLog], folder: Path, rep
 
     law = scenario.controller
     title = f"{scenario.name}: {logs[0].robot}, seed {logs[0].seed}"
-    figure = time_figure(logs, title=title, d_min=law.d_min, buffer=law.buffer)
+    signals = scenario.signals() if isinstance(scenario, HriScenario) else ()
+    figure = time_figure(logs, title=title, d_min=law.d_min, buffer=law.buffer, signals=signals)
     write_bytes(folder / "distance.png", png(figure))
     report(0.5)
     return f"{scenario.name}: distance.png" + _draw_pairs(scenario, logs, folder)

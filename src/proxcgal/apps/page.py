@@ -72,6 +72,8 @@ def _parts(runs: Sequence[Run], about: About) -> Iterator[str]:
         yield f"<h2>{escape(run.summary.scenario)}</h2>"
         if run.about.description:
             yield f"<p>{escape(_sentence(run.about.description))}</p>"
+        if _beside_a_person(run):
+            yield from _phases(run)
         for name, caption in PICTURES:
             part, used = picture(run.folder / name, caption, budget)
             budget -= used
@@ -92,9 +94,15 @@ def _parts(runs: Sequence[Run], about: About) -> Iterator[str]:
 def _introduction(runs: Sequence[Run]) -> Iterator[str]:
     robots = ", ".join(sorted({str(run.summary.robot) for run in runs}))
     seeds = ", ".join(sorted({str(run.summary.seed) for run in runs}))
+    if any(_beside_a_person(run) for run in runs):
+        yield (
+            "<p>A virtual subject walks in, fetches tools and assembles at a car door while the "
+            "arm goes back and forth before it. True distances run from the person to the links "
+            "that move.</p>"
+        )
     yield (
         f"<p>A simulated arm ({escape(robots)}, seed {escape(seeds)}) with rings of 8 x 8 zone "
-        "time-of-flight sensors is sent to a goal that lies beyond an obstacle. Each scene is run "
+        f"time-of-flight sensors {_sent(runs)}. Each scene is run "
         "by several controllers that differ in one thing: what the avoidance may move. "
         "<code>wb</code> moves the surface point nearest to the obstacle, on any link, covered "
         "with sensors or not; <code>sm</code>, the baseline, only the sensors' own mounting "
@@ -102,6 +110,34 @@ def _introduction(runs: Sequence[Run]) -> Iterator[str]:
         "of the sensors: the ceiling, not a result of ours; <code>wb_memory</code> is "
         "<code>wb</code> that remembers what left the sensors' view.</p>"
     )
+
+
+def _beside_a_person(run: Run) -> bool:
+    return any(numbers.mean_m for numbers in run.summary.controllers.values())
+
+
+def _sent(runs: Sequence[Run]) -> str:
+    if all(_beside_a_person(run) for run in runs):
+        return "goes from way point to way point"
+    return "is sent to a goal that lies beyond an obstacle"
+
+
+def _phases(run: Run) -> Iterator[str]:
+    """Mean distances beside a person."""
+    phases = [*dict.fromkeys(p for n in run.summary.controllers.values() for p in n.mean_m)]
+    yield '<div class="scroll"><table><caption>Mean distance to the person, over the cycle and in '
+    yield "each phase: true, and seen (the filtered cloud's, moments without one left out)."
+    yield '</caption><thead><tr><th class="left">controller</th>'
+    for phase in phases:
+        yield f"<th>{escape(phase)}<small>true, m</small></th><th>seen<small>m</small></th>"
+    yield "</tr></thead><tbody>"
+    for name, numbers in run.summary.controllers.items():
+        yield f'<tr><td class="left">{escape(NAMES.get(name, name))}</td>'
+        for phase in phases:
+            means = numbers.mean_m.get(phase, {})
+            yield f"<td>{shown(means.get('true'))}</td><td>{shown(means.get('seen'))}</td>"
+        yield "</tr>"
+    yield "</tbody></table></div>"
 
 
 def _table(runs: Sequence[Run]) -> Iterator[str]:
@@ -148,7 +184,7 @@ def _table(runs: Sequence[Run]) -> Iterator[str]:
 def _verdict(runs: Sequence[Run]) -> Iterator[str]:
     for run in runs:
         gain, ends = run.summary.gain_mm, run.summary.controllers
-        if gain is not None and {"wb", "sm"} <= ends.keys():
+        if gain is not None and {"wb", "sm"} <= ends.keys() and not _beside_a_person(run):
             more = "farther from" if gain >= 0.0 else "nearer to"
             yield (
                 f"<p>In <b>{escape(run.summary.scenario)}</b> the whole-body law ends "
@@ -163,9 +199,8 @@ def _verdict(runs: Sequence[Run]) -> Iterator[str]:
                 f"{shown(own)} m of itself, allowed is {SELF_LIMIT_M} m.</p>"
             )
     yield (
-        '<p class="soft">Reaching the goal is not asked for: it lies beyond the obstacle, and '
-        "keeping the distance comes first. These are engineering figures from a simulation, not "
-        "a certificate of any kind.</p>"
+        '<p class="soft">Reaching the goal is not asked for: keeping the distance comes first. '
+        "These are engineering figures from a simulation, not a certificate of any kind.</p>"
     )
 
 

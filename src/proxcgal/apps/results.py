@@ -70,8 +70,6 @@ def perform(
         ProxError: a trial failed; recordings up to then are kept.
         KeyboardInterrupt: with a message of what was kept.
     """
-    from proxcgal.sim.walk.guided import GuidedScenario, off_paths
-
     trials = [(plan, name) for plan in plans for name in plan.controllers]
     made = ready([plan.folder for plan in plans])
     try:
@@ -83,9 +81,7 @@ def perform(
             ]
             summaries = []
             for plan, own in zip(plans, grouped, strict=True):
-                summaries.append(static_summary(own))
-                if isinstance(plan.scenario, GuidedScenario):
-                    summaries[-1]["tool_off_path_m"] = off_paths(plan.scenario, own)
+                summaries.append(_summary(plan.scenario, own))
                 write_text(plan.folder / "scenario.toml", plan.scenario.to_toml())
                 write_json(plan.folder / "run.json", _about(plan, own, origin))
                 write_json(plan.folder / "summary.json", summaries[-1])
@@ -97,6 +93,25 @@ def perform(
     finally:
         remove_empty(made)
     return summaries
+
+
+def _summary(scenario: Scenario, logs: Sequence[TrialLog]) -> Summary:
+    """What `summary.json` says; beside a person, mean distances too; how well a hand was followed."""
+    from proxcgal.sim.scenario import HriScenario
+    from proxcgal.sim.walk.guided import GuidedScenario, off_paths
+    from proxcgal.study.phases import mean_distances
+
+    summary = static_summary(logs)
+    if isinstance(scenario, HriScenario):
+        summary["subject"] = scenario.operator.subject
+        for log in logs:
+            summary["controllers"][log.controller]["mean_m"] = {
+                phase: {"true": true, "seen": seen}
+                for phase, (true, seen) in mean_distances(log, scenario).items()
+            }
+    if isinstance(scenario, GuidedScenario):
+        summary["tool_off_path_m"] = off_paths(scenario, logs)
+    return summary
 
 
 def check(

@@ -39,6 +39,7 @@ class RunOptions:
       proxcgal run front_plane --set controller.d_min=0.25 simulation.dropout=0.1
       proxcgal run walkthrough_overspeed
       proxcgal run joint_gate --set controller.off='["minimum_altitude"]'
+      proxcgal run hri_task1 --subject 7 --controller wb sm
       proxcgal run my_scene.toml --robot my_arm.urdf --package-dir ~/robots
     """
 
@@ -54,6 +55,8 @@ class RunOptions:
     its perception is sensed."""
     robot: Annotated[str | None, tyro.conf.arg(metavar="NAME|PATH", help_behavior_hint="")] = None
     """A name that `proxcgal robots` lists, or a .urdf or .xml file, instead of the scenario's."""
+    subject: Number = None
+    """Which virtual subject works there, from 1; of scenarios with an operator."""
     package_dir: Folders = ()
     """Where package:// paths of the robot's file are looked up."""
     seed: Number = None
@@ -87,6 +90,13 @@ def run_command(options: RunOptions, command: str) -> int:
             "--controller: none given, at least one of wb, sm, wb_known, wb_memory is needed"
         )
     workers = checked_workers(options.workers)
+    if options.subject is not None:
+        kind = load_scenario(options.scenario, flat(options.set)).kind
+        if kind != "hri":
+            raise ConfigError(
+                f'--subject {options.subject}: {options.scenario} has kind = "{kind}" and no '
+                'operator; scenarios of kind = "hri" have one'
+            )
     scenario = load_scenario(options.scenario, overrides(options))
     if scenario.kind == "walkthrough":
         return _run_walkthrough(scenario, options, command)
@@ -131,6 +141,8 @@ def overrides(options: RunOptions) -> list[str]:
     folders = [str(path.expanduser().absolute()) for path in flat(options.package_dir)]
     if folders:
         changes.append("package_dirs=" + json.dumps(folders))
+    if options.subject is not None:
+        changes.append(f"operator.subject={options.subject}")
     if options.seed is not None:
         changes.append(f"seed={options.seed}")
     return changes + flat(options.set)

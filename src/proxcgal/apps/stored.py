@@ -25,6 +25,7 @@ class Numbers(_Stored):
     goal_error_m: float | None = None
     violations: int | None = None
     self_min_m: float | None = None
+    mean_m: dict[str, dict[str, float | None]] = {}  # beside a person: by phase, true and seen
 
 
 class StoredSummary(_Stored):

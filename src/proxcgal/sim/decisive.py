@@ -20,8 +20,12 @@ from proxcgal.sim.truth import AHEAD_M, solid_distance
 if TYPE_CHECKING:
     from proxcgal.models.robots import Robot
     from proxcgal.sim.scene import Scene
+    from proxcgal.sim.solids import Solid
 
 Array = NDArray[np.float64]
+
+#: Round ticks that are asked in turn: beyond, their neighbours say more.
+NEAR_TICKS = 25
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,9 +58,9 @@ def decisive_truth(
     for row, solid in enumerate(scene.solids):
         tree = _core.MeshTree(*solid.core())
         for link in moving:
-            apart.add(tree, int(link), T_OW[:, row] @ poses_W[:, link], solid.rounding)
-    apart.ask_least(under)
+            apart.add(tree, int(link), T_OW[:, row] @ poses_W[:, link], solid)
     apart.ask(np.flatnonzero(wanted))
+    apart.ask_least(under)
     own = _Pairs(surfaces, len(q))
     for a, b in surfaces.self_pairs:
         own.add(surfaces.trees[a], int(b), inverse(poses_W[:, a]) @ poses_W[:, b])
@@ -80,13 +84,18 @@ class _Pairs:
         self.distance = np.full(ticks, np.nan)
         self.nearest = np.full(ticks, -1)
 
-    def add(self, tree: _core.MeshTree, link: int, T_AB: Array, rounding: float = 0.0) -> None:
-        """A surface, rounded, and a link with its pose (n, 4, 4) in that surface's frame."""
+    def add(self, tree: _core.MeshTree, link: int, T_AB: Array, solid: Solid | None = None) -> None:
+        """A surface, a solid's or a link's, and a link with its pose (n, 4, 4) in its frame."""
         self._trees.append(tree)
-        self._rounding.append(rounding)
+        self._rounding.append(0.0 if solid is None else solid.rounding)
         self._T_AB.append(T_AB)
         self._sweeps.append(self._surfaces.sweep(np.full(len(T_AB), link), T_AB))
-        self._at_least = np.pad(self._at_least, ((0, 1), (0, 0)))
+        at_least = np.zeros(len(T_AB))
+        if solid is not None:  # from the box round the solid to the ball round the link
+            outside = np.maximum(np.abs(self._sweeps[-1][:, :3]) - solid.extent, 0.0)
+            far = np.sqrt(np.einsum("ni,ni->n", outside, outside))
+            at_least = np.maximum(far - self._surfaces.radii[link], 0.0)
+        self._at_least = np.vstack([self._at_least, at_least])
         self.links.append(link)
 
     def ask_least(self, under: float) -> None:
@@ -107,11 +116,14 @@ class _Pairs:
 
     def ask(self, ticks: NDArray[np.intp]) -> None:
         """Asks these ticks, unless they were."""
-        for tick in ticks:
-            if np.isnan(self.distance[tick]):
-                self._ask(int(tick))
+        if self.links:
+            for tick in ticks:
+                if np.isnan(self.distance[tick]):
+                    self._ask(int(tick), NEAR_TICKS)
 
-    def _ask(self, tick: int) -> None:
+    def _ask(self, tick: int, near: int | None = None) -> None:
+        """Asks one tick; what follows for so many ticks to either side, or for all, is noted."""
+        ticks = slice(None) if near is None else slice(max(tick - near, 0), tick + near + 1)
         best, nearest = np.inf, -1
         for row in np.argsort(self._at_least[:, tick]):
             if self._at_least[row, tick] >= best:
@@ -120,9 +132,9 @@ class _Pairs:
             other, T_AB = self._surfaces.trees[self.links[row]], self._T_AB[row][tick]
             found = solid_distance(self._trees[row], self._rounding[row], other, T_AB, bound)[0]
             distance = min(found, bound)
-            sweep = self._sweeps[row]
-            nearer = distance - moved(sweep[tick : tick + 1], sweep)
-            np.maximum(self._at_least[row], nearer, out=self._at_least[row])
+            sweep, known = self._sweeps[row], self._at_least[row, ticks]
+            nearer = distance - moved(sweep[tick : tick + 1], sweep[ticks])
+            np.maximum(known, nearer, out=known)
             if distance < best:
                 best, nearest = distance, int(row)
         self.distance[tick], self.nearest[tick] = best, nearest

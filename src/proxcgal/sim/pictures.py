@@ -116,7 +116,8 @@ def animate(
     end = recording.ticks[-1].given.time if recording.ticks else 0.0
     times = np.arange(0.0, min(end, seconds or end) + 1e-9, 1.0 / fps)
     replay = Replay(recording)
-    world = World(replay.setup.robot, replay.setup.scene)
+    scenario = replay.setup.scenario
+    world = World(replay.setup.robot, scenario.drawn(), scenario.floor)
     try:
         frames = [
             Image.fromarray(draw(world, snapshot, size, camera or viewpoint(replay.setup)))

@@ -12,6 +12,7 @@ from pydantic import Field, ValidationError
 from proxcgal.errors import ConfigError
 from proxcgal.models.paths import is_robot_file
 from proxcgal.sim import toml
+from proxcgal.sim.human.person import Person, person_of
 from proxcgal.sim.scenario_keys import (
     Fault,
     Goal,
@@ -23,8 +24,9 @@ from proxcgal.sim.scenario_keys import (
     Skin,
 )
 from proxcgal.sim.scenario_law import Controller
+from proxcgal.sim.scenario_operator import Operator
 from proxcgal.sim.scenario_problems import lines
-from proxcgal.sim.scene import ObstacleScene, Scene
+from proxcgal.sim.scene import ObstacleScene, Scene, Together
 
 if TYPE_CHECKING:
     from proxcgal.sim.scenario_joint import Finish
@@ -41,7 +43,7 @@ class Scenario(Section):
 
     name: str = Field("unnamed", description="left out in a file: the file's own name")
     description: str = Field("", description="one line, shown in lists")
-    kind: Literal["static", "walkthrough", "guided"] = Field(
+    kind: Literal["static", "hri", "joint", "walkthrough", "guided"] = Field(
         description="what kind of scene this is"
     )
     robot: str = Field(description="a built-in robot's name, or a path to .urdf or .xml")
@@ -66,7 +68,15 @@ class Scenario(Section):
     faults: tuple[Fault, ...] = Field((), alias="fault")
 
     def scene(self) -> Scene:
-        """What stands and moves beside the robot."""
+        """What stands and moves beside the robot and can be sensed."""
+        return ObstacleScene([obstacle for obstacle in self.obstacles if obstacle.sensed])
+
+    def measured(self) -> Scene:
+        """What true distances run to."""
+        return self.scene()
+
+    def drawn(self) -> Scene:
+        """All that is there."""
         return ObstacleScene(self.obstacles)
 
     def start(self) -> tuple[str, tuple[float, ...]]:
@@ -80,10 +90,65 @@ class Scenario(Section):
     def ends(self) -> Finish | None:
         """When a run is over before its time; None: never."""
         return None
+    @property
+    def floor(self) -> float:
+        """Height of the floor in pictures [m]; sensors see none."""
+        return 0.0
 
     def to_toml(self) -> str:
         """The file that gives this scenario again, with every default written out."""
         return toml.write(self.model_dump(by_alias=True))
+
+
+class HriScenario(Scenario):
+    """A person walks in and works beside the arm; distances run to that person alone."""
+
+    operator: Operator
+
+    def person(self) -> Person:
+        """Who works there.
+
+        Raises:
+            ConfigError: a recording that cannot be read; a place out of reach, or not in time.
+        """
+        return person_of(self.operator, self.duration)
+
+    def scene(self) -> Scene:
+        """The person, and what else can be sensed."""
+        return Together(self.person(), super().scene())
+
+    def measured(self) -> Scene:
+        """The person."""
+        return self.person()
+
+    def drawn(self) -> Scene:
+        """The person, and all that stands round."""
+        return Together(self.person(), super().drawn())
+
+    @property
+    def floor(self) -> float:
+        """Height of the floor that the person stands on [m]; sensors see none."""
+        return self.operator.floor
+
+    def signals(self) -> list[tuple[float, str]]:
+        """Time [s] and note of every signal of the timeline."""
+        return [(step.at, step.note) for step in self.operator.timeline]
+
+    @property
+    def on_the_left(self) -> bool:
+        """Does the person work on the arm's left?"""
+        step = self.operator.timeline[0]
+        return self.operator.marks[step.mark][1] > 0.0
+
+    def windows(self) -> dict[str, tuple[float, float]]:
+        """Start and end of every phase that is reported, by name [s]."""
+        steps = self.operator.timeline
+        ends = [*(step.at for step in steps[1:]), self.duration]
+        return {
+            step.phase: (step.at, end)
+            for step, end in zip(steps, ends, strict=True)
+            if step.phase is not None
+        }
 
 
 def kinds() -> dict[str, type[Scenario]]:
@@ -92,8 +157,8 @@ def kinds() -> dict[str, type[Scenario]]:
     from proxcgal.sim.walk.keys import GuidedScenario, WalkScenario
 
     return {
-        "static": Scenario, "joint": JointScenario, "walkthrough": WalkScenario,
-        "guided": GuidedScenario,
+        "static": Scenario, "hri": HriScenario, "joint": JointScenario,
+        "walkthrough": WalkScenario, "guided": GuidedScenario,
     }  # fmt: skip
 
 
@@ -167,6 +232,9 @@ def _anchor(table: dict[str, Any], folder: Path) -> None:
     ratings = table.get("ratings")
     if isinstance(ratings, str):
         table["ratings"] = str((folder / ratings).absolute())
+    operator = table.get("operator")
+    if isinstance(operator, dict) and isinstance(operator.get("recording"), str):
+        operator["recording"] = str((folder / operator["recording"]).absolute())
     places = table.get("package_dirs")
     if isinstance(places, list) and all(isinstance(place, str) for place in places):
         table["package_dirs"] = [str((folder / place).absolute()) for place in places]

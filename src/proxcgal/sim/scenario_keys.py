@@ -99,22 +99,30 @@ class Section(BaseModel):
 
 
 class Goal(Section):
-    """Where the tool is to go: exactly one of `offset` and `position`."""
+    """Where the tool is to go: exactly one of `offset`, `position` and `waypoints`."""
 
     offset: Vector | None = Field(
         None, description="[m] in the base frame, from where the tool starts, orientation kept"
     )
     position: Vector | None = Field(None, description="[m] of the tool, in the base frame")
-    rpy: Vector | None = Field(
-        None, description="[rad] roll, pitch, yaw beside `position`; left out: orientation kept"
+    waypoints: tuple[Vector, ...] | None = Field(
+        None, min_length=2, description="[m] of the tool, one after the other, back and forth"
     )
+    rpy: Vector | None = Field(
+        None,
+        description="[rad] roll, pitch, yaw beside `position` and `waypoints`; left out: "
+        "orientation kept",
+    )
+    arrival: Positive = Field(0.02, description="[m] so near to a way point, the next one is due")
+    patience: Positive = Field(10.0, description="[s] after which the next way point is due anyway")
 
     @model_validator(mode="after")
     def _one_form(self) -> Self:
-        if (self.offset is None) == (self.position is None):
-            raise ValueError("needs exactly one of offset and position")
+        forms = (self.offset, self.position, self.waypoints)
+        if sum(form is not None for form in forms) != 1:
+            raise ValueError("needs exactly one of offset, position and waypoints")
         if self.offset is not None and self.rpy is not None:
-            raise ValueError("rpy goes with position, offset keeps the orientation")
+            raise ValueError("rpy goes with position and waypoints, offset keeps the orientation")
         return self
 
 
@@ -208,6 +216,9 @@ _SIZES = {"box": 3, "cylinder": 2, "capsule": 2, "sphere": 1}
 class Obstacle(Section):
     """A solid that stands still, or moves on a path of its own."""
 
+    sensed: bool = Field(
+        True, description="false: only drawn, neither seen by sensors, known, nor measured against"
+    )
     name: str = Field("panel", description="for messages and pictures")
     shape: Literal["box", "cylinder", "capsule", "sphere"] = Field(
         "box", description="round ones stand along their own z axis"

@@ -73,6 +73,27 @@ class ObstacleScene:
         return twists
 
 
+class Together:
+    """Several scenes as one."""
+
+    def __init__(self, *scenes: Scene) -> None:
+        """Args: `scenes`, whose solids follow one another."""
+        self._scenes = [scene for scene in scenes if scene.solids]
+        self.names = tuple(name for scene in self._scenes for name in scene.names)
+        self.solids = tuple(solid for scene in self._scenes for solid in scene.solids)
+        self.still = all(scene.still for scene in self._scenes)
+
+    def poses(self, time: float) -> Array:
+        """(n, 4, 4) T_WO."""
+        parts = [scene.poses(time) for scene in self._scenes]
+        return np.concatenate([np.empty((0, 4, 4)), *parts])
+
+    def twists(self, time: float) -> Array:
+        """(n, 6) in world: velocity of each origin [m/s], angular velocity [rad/s]."""
+        parts = [scene.twists(time) for scene in self._scenes]
+        return np.concatenate([np.empty((0, 6)), *parts])
+
+
 class KnownCloud:
     """Points of a scene's own surfaces, which ride on its solids."""
 

@@ -29,8 +29,9 @@ class Setup:
     robot: Robot
     skin: _core.Skin
     q0: Array  #: (n_q,)
-    goal: Array  #: (4, 4) T_WT
-    scene: Scene
+    goals: tuple[Array, ...]  #: (4, 4) T_WT each, in the order of their turn
+    scene: Scene  #: what sensors see and known points lie on
+    measured: Scene  #: what true distances run to
 
     @classmethod
     def of(cls, scenario: Scenario, robot: Robot | None = None) -> Self:
@@ -44,8 +45,14 @@ class Setup:
         q0 = _start(scenario, robot)
         return cls(
             scenario=scenario, robot=robot, skin=make_skin(scenario, robot), q0=q0,
-            goal=_goal(scenario, robot, q0), scene=scenario.scene(),
+            goals=_goals(scenario, robot, q0), scene=scenario.scene(),
+            measured=scenario.measured(),
         )  # fmt: skip
+
+    @property
+    def goal(self) -> Array:
+        """(4, 4) T_WT, the first of them."""
+        return self.goals[0]
 
     def uses_known_points(self, controller: str) -> bool:
         """Does this controller get points of the scene itself instead of scans?"""
@@ -171,16 +178,20 @@ def posture_problems(robot: Robot, q: Sequence[float], key: str) -> list[str]:
     ]
 
 
-def _goal(scenario: Scenario, robot: Robot, q0: Array) -> Array:
-    T_WT = np.array(robot.tool_pose(q0))
-    goal = scenario.goal
+def _goals(scenario: Scenario, robot: Robot, q0: Array) -> tuple[Array, ...]:
+    start, goal = np.array(robot.tool_pose(q0)), scenario.goal
     if goal.offset is not None:
-        T_WT[:3, 3] += goal.offset
-    elif goal.position is not None:
-        T_WT[:3, 3] = goal.position
-    if goal.rpy is not None:
-        T_WT[:3, :3] = frames.rotation(goal.rpy)
-    return T_WT
+        places = [start[:3, 3] + goal.offset]
+    else:
+        places = [np.array(place) for place in goal.waypoints or [goal.position]]
+    goals = []
+    for place in places:
+        T_WT = start.copy()
+        T_WT[:3, 3] = place
+        if goal.rpy is not None:
+            T_WT[:3, :3] = frames.rotation(goal.rpy)
+        goals.append(T_WT)
+    return tuple(goals)
 
 
 def _task(name: str, settings: Controller) -> Any:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxcgal import _core
+from proxcgal.sim.errand import Errand
 from proxcgal.sim.mounting import RealMounts
 from proxcgal.sim.ranges import ZONES, RangeModel
 from proxcgal.sim.setup import Setup
@@ -56,7 +57,9 @@ class SimulatedSource:
     def __init__(self, setup: Setup, world: World | None, seed: int) -> None:
         """Args: without a `world` nothing is sensed."""
         settings = setup.scenario.simulation
+        goal = setup.scenario.goal
         self._setup = setup
+        self._errand = Errand(setup.goals, goal.arrival, goal.patience)
         self._world = world
         self._period = 1.0 / settings.control_hz
         self._ticks = max(round(setup.scenario.duration * settings.control_hz), 1)
@@ -110,7 +113,9 @@ class SimulatedSource:
             rows = [int(row) for row in np.flatnonzero(stamps == stamp)]
             scans += self._measure(rows, stamp, before + self._qd * (stamp - start))
         self._tick += 1
-        return TickInput(time, self._q, self._setup.goal, tuple(scans), self._world is None)
+        tool_W = np.asarray(self._setup.robot.tool_pose(self._q))[:3, 3]
+        goal = self._errand.at(time, tool_W)
+        return TickInput(time, self._q, goal, tuple(scans), self._world is None)
 
     def command(self, qd: Array) -> None:
         """Velocity until the next tick (n_q,)."""

@@ -38,7 +38,8 @@ class Surfaces:
         low = np.array([vertices_L.min(axis=0) for vertices_L in self._vertices])
         high = np.array([vertices_L.max(axis=0) for vertices_L in self._vertices])
         self._centers = 0.5 * (low + high)
-        self._radii = np.array([
+        #: (links,) [m] of the ball round each link, about the middle of its box.
+        self.radii = np.array([
             np.linalg.norm(vertices_L - center, axis=1).max()
             for vertices_L, center in zip(self._vertices, self._centers, strict=True)
         ])  # fmt: skip
@@ -79,7 +80,7 @@ class Surfaces:
 
     def sweep(self, links: NDArray[np.intp], poses: Array) -> Array:
         """(k, 12) of links (k,) at poses (k, 4, 4), for `moved` [m]: centre, turned radius."""
-        radii, R = self._radii[links, None, None], poses[:, :3, :3]
+        radii, R = self.radii[links, None, None], poses[:, :3, :3]
         centers = np.einsum("nij,nj->ni", R, self._centers[links]) + poses[:, :3, 3]
         # A difference of rotations has two equal singular values and a zero.
         return np.hstack([centers, (R * radii / np.sqrt(2.0)).reshape(-1, 9)])

@@ -24,7 +24,7 @@ from proxcgal.sim.scenario import CONTROLLERS, Scenario
 from proxcgal.sim.setup import Setup
 from proxcgal.sim.source import SimulatedSource
 from proxcgal.sim.ticks import Tick, TickTruth
-from proxcgal.sim.trial_log import TOO_CLOSE, TrialLog, final_ticks
+from proxcgal.sim.trial_log import TOO_CLOSE, TrialLog, final_ticks, sampled_ticks
 from proxcgal.sim.truth import NOT_ASKED, Truth
 from proxcgal.sim.walk.guided import GuidedScenario, GuidedSource
 from proxcgal.sim.world import World
@@ -46,6 +46,7 @@ def run_trial(
     sparse_truth: bool = False,
     without_truth: bool = False,
     coverage: bool = False,
+    truth_hz: float | None = None,
 ) -> TrialLog:
     """Simulates a scenario with one controller.
 
@@ -60,6 +61,7 @@ def run_trial(
             stays exact; nan elsewhere. A recording has them at every tick.
         without_truth: none at all, for studies of other things; not for a recording.
         coverage: tell what of the closest points was in view.
+        truth_hz: with `sparse_truth`, true distances to the scene so often too.
 
     Raises:
         ConfigError: what of the scenario does not fit; sensors that do not sit where it says.
@@ -77,7 +79,7 @@ def run_trial(
     if world is not None and scenario.skin.check_mounts:
         require_mounts(setup, source)
     sparse = (sparse_truth or without_truth) and recorder is None
-    truth = None if sparse else Truth(setup.robot, setup.scene)
+    truth = None if sparse else Truth(setup.robot, setup.measured)
     log = None
     if recorder is not None:
         recorder.start(
@@ -118,7 +120,8 @@ def run_trial(
     # Not the ticks' own time, which a fault may make jump.
     elapsed = np.arange(len(ticks), dtype=np.float64) * period
     if truth is None and not without_truth:
-        ticks = _with_truth(ticks, elapsed, np.array(reached), setup)
+        wanted = final_ticks(elapsed) | sampled_ticks(elapsed, truth_hz or 0.0)
+        ticks = _with_truth(ticks, elapsed, np.array(reached), setup, wanted)
     log_of_run = TrialLog.of(
         ticks, setup.robot, scenario=scenario.name, controller=controller, seed=seed,
         wall_s=clock.perf_counter() - begin, elapsed=elapsed,
@@ -129,11 +132,11 @@ def run_trial(
     return replace(log_of_run, coverage=coverage_of(setup, np.array(reached), elapsed))
 
 
-def _with_truth(ticks: Sequence[Tick], elapsed: Array, q: Array, setup: Setup) -> list[Tick]:
-    """The ticks with the true distances that the summary needs."""
-    asked = decisive_truth(
-        setup.robot, setup.scene, elapsed, q, final_ticks(elapsed), under=TOO_CLOSE
-    )
+def _with_truth(
+    ticks: Sequence[Tick], elapsed: Array, q: Array, setup: Setup, wanted: NDArray[np.bool_]
+) -> list[Tick]:
+    """The ticks with the true distances that are wanted or decide."""
+    asked = decisive_truth(setup.robot, setup.measured, elapsed, q, wanted, under=TOO_CLOSE)
     return [
         replace(tick, truth=TickTruth(float(distance), link, float(own), tick.truth.leaked))
         for tick, distance, link, own in zip(
@@ -153,7 +156,7 @@ class _Log:
 
     def __init__(self, recorder: Recorder, setup: Setup, hz: float) -> None:
         self._recorder = recorder
-        self._robot, self._scene = setup.robot, setup.scene
+        self._robot, self._scene = setup.robot, setup.scenario.drawn()
         self._hz = hz
         self._beats = -1
 

@@ -155,6 +155,12 @@ def final_ticks(elapsed: Array) -> NDArray[np.bool_]:
     return elapsed >= elapsed[-1:] - FINAL if len(elapsed) else np.zeros(0, bool)
 
 
+def sampled_ticks(elapsed: Array, hz: float) -> NDArray[np.bool_]:
+    """(n,) true for the first tick of every period, from the first tick on; 0 Hz: for none."""
+    beats = np.floor(elapsed * hz + 1e-9)
+    return np.diff(beats, prepend=-1.0 if hz > 0.0 else 0.0) > 0.0
+
+
 def _least(distances: Array) -> float:
     """Of those that were asked; nan where none was."""
     return float(min(np.fmin.reduce(distances, initial=np.inf), NOTHING))

@@ -1,9 +1,10 @@
-"""How sure a median is, or a ratio of sums."""
+"""How sure a median is, a mean, or a ratio of sums."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +16,9 @@ _PARTS = 20
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """A median with its bootstrap interval."""
+    """A median or mean with its bootstrap interval."""
 
-    median: float
+    middle: float
     low: float
     high: float
 
@@ -59,14 +60,23 @@ def median_interval(values: Sequence[float], seed: int = 0) -> Interval | None:
 
     The resamples are drawn from `seed`: the same values always give the same interval.
     """
+    return _interval(values, np.median, seed)
+
+
+def mean_interval(values: Sequence[float], seed: int = 0) -> Interval | None:
+    """As `median_interval`, of the mean."""
+    return _interval(values, np.mean, seed)
+
+
+def _interval(values: Sequence[float], middle: Any, seed: int) -> Interval | None:
     sample = np.asarray(values, np.float64)
     if not len(sample):
         return None
     generator = np.random.default_rng(seed)
-    medians = np.empty(RESAMPLES)
-    for part in np.split(medians, _PARTS):  # all at once would take memory
+    middles = np.empty(RESAMPLES)
+    for part in np.split(middles, _PARTS):  # all at once would take memory
         rows = generator.integers(len(sample), size=(len(part), len(sample)))
-        part[:] = np.median(sample[rows], axis=1)
+        part[:] = middle(sample[rows], axis=1)
     tail = 50.0 * (1.0 - CONFIDENCE)
-    low, high = np.percentile(medians, [tail, 100.0 - tail])
-    return Interval(float(np.median(sample)), float(low), float(high))
+    low, high = np.percentile(middles, [tail, 100.0 - tail])
+    return Interval(float(middle(sample)), float(low), float(high))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,7 +33,12 @@ DASHED: Any = (0, (4, 1.6))
 LEGEND: dict[str, Any] = {"frameon": False, "fontsize": 9, "handlelength": 2.4}
 
 
-def time_figure(logs: Sequence[TrialLog], *, title: str, d_min: float, buffer: float) -> Figure:
+Signals = Sequence[tuple[float, str]]  # time [s], note
+
+
+def time_figure(
+    logs: Sequence[TrialLog], *, title: str, d_min: float, buffer: float, signals: Signals = ()
+) -> Figure:
     """Distance, activation and link of the control point over time, all controllers in one.
 
     The form of [WA] Figs. 7 and 8, with the true distance (dashed) beside the seen one (solid).
@@ -43,6 +48,7 @@ def time_figure(logs: Sequence[TrialLog], *, title: str, d_min: float, buffer: f
         title: above the figure.
         d_min: distance that the avoidance keeps [m].
         buffer: Delta, over which its activation rises [m].
+        signals: vertical lines through all of it.
     """
     figure = Figure(figsize=(7.2, 5.8), dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
@@ -51,6 +57,7 @@ def time_figure(logs: Sequence[TrialLog], *, title: str, d_min: float, buffer: f
     _distances(axes[0], logs, d_min, buffer)
     _activations(axes[1], logs)
     _links(axes[2], logs)
+    mark_signals(axes, signals)
     axes[2].set_xlabel("time [s]", fontsize=10)
     axes[2].set_xlim(0.0, max(_end(log) for log in logs))
     for ax in axes:
@@ -97,6 +104,19 @@ def _distances(ax: Axes, logs: Sequence[TrialLog], d_min: float, buffer: float) 
         "ncols": len(handles),
     }
     ax.legend(handles, [*labels, "seen", "true"], columnspacing=1.4, **place, **LEGEND)
+
+
+def mark_signals(axes: Iterable[Axes], signals: Signals) -> None:
+    """Vertical lines through all axes, with their notes along them in the first."""
+    for row, ax in enumerate(axes):
+        for at, note in signals:
+            ax.axvline(at, color=GREY, linewidth=0.8, alpha=0.6, zorder=1)
+            if row == 0:
+                ax.annotate(
+                    note, (at, 1.0), xycoords=("data", "axes fraction"), xytext=(2, -3),
+                    textcoords="offset points", fontsize=7, color=GREY, rotation=90, ha="left",
+                    va="top",
+                )  # fmt: skip
 
 
 def _width(controller: str) -> float:

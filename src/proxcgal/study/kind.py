@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from proxcgal.study.analysis import Summary, aligned
-from proxcgal.study.campaign import Campaign
+from proxcgal.study.campaign import Campaign, Trial
 
 if TYPE_CHECKING:
     import polars as pl
@@ -18,10 +18,12 @@ if TYPE_CHECKING:
 class Wishes:
     """What a user asks a campaign for."""
 
-    runs: int  # draws of each scene
+    runs: int  # draws of each scene, or subjects
     seed: int
     scenarios: tuple[str, ...] = ()  # names or files, instead of the kind's own
     overrides: tuple[str, ...] = ()  # `key.sub=value`, for all trials
+    controllers: tuple[str, ...] = ()  # instead of the kind's own
+    jitter: bool = True  # where the kind repeats its trials with moved positions
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,3 +57,5 @@ class Kind:
     worst: Callable[[pl.DataFrame], list[str]]  # keys of trials, the worst first
     pages: Callable[[Summary], dict[str, str]] | None = None  # further text, by file
     runs: int = 100  # where nothing else is wished for
+    # Trials of one scene to show side by side, in a moving picture; none where it is left out.
+    shown: Callable[[Campaign], list[Trial]] | None = None

@@ -12,6 +12,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from proxcgal.sim.pictures import Snapshot, draw, snapshots, write_gif
 from proxcgal.sim.recording import Recording
+from proxcgal.sim.scenario import HriScenario
 from proxcgal.sim.setup import Setup
 from proxcgal.sim.solids import Box
 from proxcgal.sim.world import Camera, World
@@ -45,7 +46,7 @@ def motion_picture(
     times = np.linspace(0.0, max(r.ticks[-1].given.time for r in recordings), FRAMES)
     seen = [snapshots(recording, times.tolist()) for recording in recordings]
     camera = camera_for(setup)
-    world = World(setup.robot, setup.scene)
+    world = World(setup.robot, setup.scenario.drawn(), setup.scenario.floor)
     frames = []
     try:
         for row, moment in enumerate(zip(*seen, strict=True)):
@@ -64,6 +65,12 @@ def motion_picture(
 
 def camera_for(setup: Setup) -> Camera:
     """A camera that has the arm and the first obstacle in view."""
+    if isinstance(setup.scenario, HriScenario):
+        left = setup.scenario.on_the_left
+        return Camera(
+            lookat_W=(0.5, 0.3 if left else -0.3, 0.0), distance=3.0,
+            azimuth=float(np.deg2rad(-20.0 if left else 20.0)), elevation=float(np.deg2rad(-30.0)),
+        )  # fmt: skip
     if not setup.scene.solids:
         return Camera()
     tool_W = np.asarray(setup.robot.tool_pose(setup.q0))[:3, 3]
@@ -81,6 +88,8 @@ def bearing_for(setup: Setup) -> float:
 
     Along the first obstacle's face and a little from the arm's side, so that it hides nothing.
     """
+    if isinstance(setup.scenario, HriScenario):  # from behind the arm, on the person's side
+        return float(np.deg2rad(150.0 if setup.scenario.on_the_left else -150.0))
     solid, T_WO = setup.scene.solids[0], setup.scene.poses(0.0)[0]
     tool_W = np.asarray(setup.robot.tool_pose(setup.q0))[:3, 3]
     to_tool_W = tool_W - T_WO[:3, 3]

@@ -187,7 +187,7 @@ def _paired(apart: list[float]) -> Summary | None:
     if interval is None:
         return None
     return {
-        "pairs": len(apart), "median": interval.median, "low": interval.low, "high": interval.high,
+        "pairs": len(apart), "median": interval.middle, "low": interval.low, "high": interval.high,
         "p5": float(np.percentile(apart, 5)), "p95": float(np.percentile(apart, 95)),
         "positive_share": float(np.mean(np.array(apart) > 0.0)),
     }  # fmt: skip

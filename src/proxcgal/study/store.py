@@ -18,7 +18,8 @@ from proxcgal.study.analysis import write_json
 MANIFEST, TRIALS, SUMMARY = "campaign.json", "trials", "summary.json"
 
 Cell = str | int | float | bool | None
-Row = dict[str, Cell]
+Series = list[float | None]  # a number over time
+Row = dict[str, Cell | Series]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

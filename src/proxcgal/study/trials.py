@@ -33,6 +33,7 @@ def simulate(
     robot_digest: str | None = None,
     without_truth: bool = False,
     coverage: bool = False,
+    truth_hz: float | None = None,
 ) -> TrialLog:
     """Runs a trial in a worker process.
 
@@ -46,6 +47,7 @@ def simulate(
         robot_digest: of the robot that it must be; left out: any.
         without_truth: no true distances at all, without a recording.
         coverage: tell what of the closest points was in view.
+        truth_hz: true distances to the scene at least so often, where nothing is recorded.
 
     Raises:
         ProxError: what of the scenario does not fit, another robot; the simulator warned.
@@ -60,6 +62,7 @@ def simulate(
             return run_trial(
                 scenario, controller, seed=seed, robot=robot, on_progress=report,
                 sparse_truth=True, without_truth=without_truth, coverage=coverage,
+                truth_hz=truth_hz,
             )  # fmt: skip
         with Recorder(recording, ticks) as recorder:
             return run_trial(

@@ -1,0 +1,1 @@
+"""Virtual operators: articulated bodies of capsules that walk, turn and reach on a timeline."""

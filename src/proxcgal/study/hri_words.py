@@ -1,0 +1,244 @@
+"""What the human study amounts to, for people: the paper's tables, sentences, captions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from proxcgal.study.analysis import SELF_LIMIT_M, Summary, shown
+from proxcgal.study.hri_numbers import PAPER, held
+from proxcgal.study.kind import Listing
+
+_LAYOUTS = {"main": "the cell as it is", "jittered": "all positions moved by up to 0.1 m"}
+_ROWS = {
+    "task1": "Assembly Task 1", "task2": "Assembly Task 2", "H1": "Assembly Operation on H1",
+    "H2": "Assembly Operation on H2", "H3_first": "Assembly Operation on H3 (first run)",
+    "H3_second": "Assembly Operation on H3 (second run)",
+}  # fmt: skip
+_SETTINGS = (
+    ("d_min", "m"), ("buffer", "m"), ("avoid_gain", "1/s"), ("nearest", ""), ("reach_gain", "1/s"),
+    ("max_linear", "m/s"), ("max_angular", "rad/s"), ("tasks", ""),
+)  # fmt: skip
+
+
+def listings(summary: Summary) -> list[Listing]:
+    """Tables I and II beside the paper's, differences, close calls, settings."""
+    found = []
+    for layout, numbers in _layouts(summary):
+        where = _LAYOUTS[layout]
+        for table, title in (("table1", "Table I, whole cycles"), ("table2", "Table II, phases")):
+            if not numbers[table]:
+                continue
+            found.append(
+                Listing(
+                    caption=f"{title}; {where}. Mean of the least distance, and the largest "
+                    "standard deviation over subjects at one time. Seen: filtered cloud to robot, "
+                    "the paper's own measure; true: exact meshes against the human's exact "
+                    "surface.",
+                    names=(
+                        "controller",
+                        "row",
+                        "seen mean",
+                        "seen sigma",
+                        "paper mean",
+                        "paper sigma",
+                        "ours - paper",
+                        "true mean",
+                        "true sigma",
+                    ),
+                    units=("", "", "m", "m", "m", "m", "m", "m", "m"),
+                    rows=list(_table(numbers[table])),
+                    left=2,
+                )
+            )
+        found.append(
+            Listing(
+                caption=f"Paired over the subjects, true means, and least true distances; {where}. "
+                "95 % bootstrap interval of the mean difference. The paper gives no intervals; its "
+                "difference stands beside. An arm that is kept from a way point waits before it "
+                "for up to 10 s, one that gets there turns back to the far one: a mean over time "
+                "pays for waiting.",
+                names=(
+                    "row",
+                    "comparison",
+                    "pairs",
+                    "difference",
+                    "95 % from",
+                    "to",
+                    "above 0",
+                    "paper",
+                ),
+                units=("", "", "", "mm", "mm", "mm", "%", "mm"),
+                rows=[
+                    *_paired(numbers["paired_mm"]),
+                    *_paired(numbers["paired_least_mm"], "{}, least"),
+                ],
+                left=2,
+            )
+        )
+        found.append(
+            Listing(
+                caption=f"Close calls; {where}. Too close: true distance under 0.05 m. Blind: "
+                "then the cloud's nearest point was more than 0.05 m farther away than the human, "
+                "or there was none.",
+                names=(
+                    "controller",
+                    "trials",
+                    "too close",
+                    "ticks",
+                    "blind",
+                    "ticks",
+                    "least",
+                    "empty cloud",
+                    "held",
+                ),
+                units=(
+                    "",
+                    "",
+                    "trials",
+                    "ticks",
+                    "trials",
+                    "ticks",
+                    "m",
+                    "% of ticks",
+                    "% of ticks",
+                ),
+                rows=list(_close(numbers["close_calls"])),
+                left=1,
+            )
+        )
+    names = list(summary["close_calls"])
+    found.append(
+        Listing(
+            caption="Settings: one set for all controllers. They differ in the control point "
+            "alone (sm: the sensors' mounting points), in what they are given (wb_known: points "
+            "of the human itself) and in what they remember (wb_memory).",
+            names=("setting", *names),
+            units=("", *("" for _ in names)),
+            rows=[
+                *(
+                    (f"{key} [{unit}]" if unit else key, *(_setting(summary, key) for _ in names))
+                    for key, unit in _SETTINGS
+                ),
+                ("x_o of eq. (4)", *(_velocity(summary, name) for name in names)),
+            ],
+            left=1,
+        )
+    )
+    return found
+
+
+def _layouts(summary: Summary) -> Iterator[tuple[str, Summary]]:
+    yield "main", summary
+    if summary["jittered"] is not None:
+        yield "jittered", summary["jittered"]
+
+
+def _table(table: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
+    for row, controllers in table.items():
+        for name, cell in controllers.items():
+            mean, sigma = PAPER.get(row, {}).get(name, (None, None))
+            apart = "-"
+            if mean is not None and cell["seen_mean_m"] is not None:
+                apart = f"{cell['seen_mean_m'] - mean:+.3f}"
+            yield (
+                name, _ROWS.get(row, row), shown(cell["seen_mean_m"]),
+                shown(cell["seen_sigma_max_m"]), shown(mean), shown(sigma), apart,
+                shown(cell["mean_m"]), shown(cell["sigma_max_m"]),
+            )  # fmt: skip
+
+
+def _paired(paired: Mapping[str, Any], form: str = "{}") -> Iterator[tuple[str, ...]]:
+    for row, comparisons in paired.items():
+        for name, pair in comparisons.items():
+            one, other = name.split("-")
+            paper = PAPER.get(row, {})
+            printed = "-"
+            if one in paper and other in paper and form == "{}":
+                printed = f"{1000.0 * (paper[one][0] - paper[other][0]):+.0f}"
+            lengths = (f"{pair[key]:+.1f}" for key in ("mean", "low", "high"))
+            yield (
+                form.format(_ROWS.get(row, row)), f"{one} - {other}", str(pair["pairs"]), *lengths,
+                f"{100.0 * pair['positive_share']:.0f}", printed,
+            )  # fmt: skip
+
+
+def _close(calls: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
+    for name, numbers in calls.items():
+        yield (
+            name, str(numbers["trials"]), str(numbers["too_close_trials"]),
+            str(numbers["too_close_ticks"]), str(numbers["blind_trials"]),
+            str(numbers["blind_ticks"]), shown(numbers["true_min_m"]),
+            *(f"{100.0 * numbers[key] / max(numbers['ticks'], 1):.1f}"
+              for key in ("empty_ticks", "held_ticks")),
+        )  # fmt: skip
+
+
+def _setting(summary: Summary, key: str) -> str:
+    value = summary["settings"][key]
+    return " > ".join(value) if isinstance(value, list) else f"{value:g}"
+
+
+def _velocity(summary: Summary, name: str) -> str:
+    """Where a controller has the obstacle's velocity from."""
+    if name == "wb_known":
+        return "known"
+    return "estimated" if name in summary["settings"]["motion"]["controllers"] else "0"
+
+
+def verdicts(summary: Summary) -> list[str]:
+    """What holds of the experiment's bounds and what does not; what else is to be known."""
+    told = []
+    for layout, numbers in _layouts(summary):
+        for what, holds, figures in held(numbers):
+            word = "holds" if holds else "DOES NOT HOLD"
+            told.append(f"{layout}: {what}: {word} ({figures}).")
+        calls = numbers["close_calls"]
+        for name in ("wb", "sm"):
+            if calls.get(name, {}).get("too_close_trials"):
+                c = calls[name]
+                told.append(
+                    f"{layout}: {name} came under 0.05 m in {c['too_close_trials']} of "
+                    f"{c['trials']} trials, {c['too_close_ticks']} ticks, of which "
+                    f"{c['blind_ticks']} in a blind spot (the paper saw two such failures in 80 "
+                    "trials)."
+                )
+    if summary["not_finite"] or summary["limits_violated"]:
+        told.append(
+            f"Trials with a command that is not finite: {summary['not_finite']}; with a violated "
+            f"joint limit: {summary['limits_violated']}."
+        )
+    else:
+        told.append("No command was not finite, none violated a joint limit.")
+    if summary["self_under_limit"]:
+        told.append(
+            f"Trials in which the arm came within {SELF_LIMIT_M} m of itself: "
+            f"{summary['self_under_limit']}; no law here avoids the own arm."
+        )
+    redrawn = ", ".join(f"{reason} {n}" for reason, n in summary["redrawn"].items())
+    told.append(
+        f"{summary['subjects']} subjects; moved cells drawn again: {redrawn or 'none'}. One core "
+        f"simulated {summary['simulated_s'] / max(summary['wall_s'], 1e-9):.1f} times faster than "
+        "real time."
+    )
+    return told
+
+
+def captions(summary: Summary) -> dict[str, str]:
+    """What the figures show."""
+    return {
+        "trials.png": "The form of [WA] Fig. 9: least distance and activation of the avoidance "
+        "over time, the same subject at the same task, (a) sensor points, (b) whole body. Solid: "
+        "seen. Dashed: true. Vertical: the signals. Dotted: the thresholds between which the "
+        "activation rises. Filled: nothing was in view.",
+        "cycles.png": "Least true distance over the cycle: mean over the subjects and one "
+        "standard deviation to either side; vertical: the signals.",
+        "subjects.png": "Each subject's mean true distance, task by task and phase by phase; "
+        "bars: means over the subjects; crosses: the paper's means, in its own (seen) measure.",
+        "differences.png": "Paired differences of the true means, subject by subject (dots), with "
+        "their mean and its 95 % bootstrap interval, in the cell as it is and in moved ones; "
+        "crosses: the paper's difference.",
+        "motion.gif": "One of the trials, in motion: red, the filtered cloud; blue, points that "
+        "were taken for the arm itself and removed; green, the pair that the avoidance acts on; "
+        "axes, the way point that is due.",
+    }
