@@ -96,7 +96,7 @@ def perform(
 
 
 def _summary(scenario: Scenario, logs: Sequence[TrialLog]) -> Summary:
-    """What `summary.json` says; beside a person, mean distances too; how well a hand was followed."""
+    """What `summary.json` says, with what belongs to the kind of scene alone."""
     from proxcgal.sim.scenario import HriScenario
     from proxcgal.sim.walk.guided import GuidedScenario, off_paths
     from proxcgal.study.phases import mean_distances

@@ -65,6 +65,7 @@ def _ga_ol() -> RobotDescription:
 
 _GA_OL = Path(__file__).with_name("ga_ol.toml")
 
+
 def _kr150_ur10e() -> RobotDescription:
     """Both arms with their own limits, the UR10e's base on the KUKA's flange, coaxial.
 

@@ -90,6 +90,7 @@ class Scenario(Section):
     def ends(self) -> Finish | None:
         """When a run is over before its time; None: never."""
         return None
+
     @property
     def floor(self) -> float:
         """Height of the floor in pictures [m]; sensors see none."""
