@@ -108,7 +108,7 @@ def run_trial(
         if on_progress is not None and len(ticks) % beat == 0:
             on_progress(min(len(ticks) * period / scenario.duration, 1.0))
         if watch is not None:
-            ending = watch((len(ticks) - 1) * period, np.asarray(setup.robot.tool_pose(given.q)))
+            ending = watch((len(ticks) - 1) * period, np.asarray(setup.robot.tool_pose(source.q)))
             if ending is not None:
                 break
     if on_progress is not None:

@@ -43,18 +43,11 @@ STACKS: dict[str, tuple[str, ...]] = {
 }
 #: Perceptions other than known: the controller, and what is changed of the scene.
 SENSED = 'perception="sensed"'
-#: The scenes stand still, so what was seen is kept for the whole run, and finely.
-_MEMORY = (
-    "controller.avoid_gain=4.0",  # what few zones see is farther away than what is there
-    "controller.memory.memory_s=60.0",
-    "controller.memory.voxel=0.02",
-    "controller.memory.max_points=4096",
-)
 PERCEPTIONS: dict[str, tuple[str, tuple[str, ...]]] = {
     "sensed": ("wb", (SENSED,)),
     "sensed_2nd_set": ("wb", (SENSED, "skin.with_optional=true")),
-    "memory": ("wb_memory", (SENSED, *_MEMORY)),
-    "memory_2nd_set": ("wb_memory", (SENSED, *_MEMORY, "skin.with_optional=true")),
+    "memory": ("wb_memory", (SENSED,)),
+    "memory_2nd_set": ("wb_memory", (SENSED, "skin.with_optional=true")),
 }
 
 
