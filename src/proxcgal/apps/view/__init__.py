@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 LOCAL = "127.0.0.1"
 PORT = 8080
+_NOT_LIVE = frozenset({"walkthrough"})
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,11 @@ def view_command(options: ViewOptions, command: str) -> int:
     from proxcgal.sim.scenario import load_scenario
 
     scenario = load_scenario(options.scenario, flat(options.set))
+    if scenario.kind in _NOT_LIVE:
+        raise ConfigError(
+            f"scenario {scenario.name}: kind = {scenario.kind!r} has physics of its own, which the "
+            "live page does not run"
+        )
     token = checked_token(options.host, options.port, options.token)
     check(scenario, [options.controller])
     server, gate = serve(

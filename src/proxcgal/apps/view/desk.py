@@ -13,7 +13,7 @@ from proxcgal.apps.view.simulation import Wishes
 Array = NDArray[np.float64]
 
 #: Where a solid may be put, least and most of x, y, z [m].
-ROOM = np.array([[-3.0, -3.0, -1.5], [3.0, 3.0, 3.0]])
+ROOM = np.array([[-5.0, -5.0, -1.5], [5.0, 5.0, 4.0]])
 
 
 class Desk:

@@ -234,7 +234,7 @@ def viewpoint(stage: Stage) -> tuple[Array, Array]:
     centers = [T_WO[:3, 3] for T_WO in stage.solids_W]
     near = min(centers, key=lambda c: float(np.linalg.norm(c - stage.tool_W)), default=stage.tool_W)
     target = 0.4 * stage.tool_W + 0.3 * near + np.array([0.0, 0.0, 0.1])
-    reach = float(np.linalg.norm(stage.tool_W[:2])) + 0.6
+    reach = float(np.linalg.norm(stage.tool_W)) + 0.5
     across = np.arctan2(near[1], near[0]) - 2.0  # a little from behind: solids hide nothing
     away = np.array([np.cos(across), np.sin(across), 0.5])
     return target + (0.9 + 1.2 * reach) * away / np.linalg.norm(away), target
