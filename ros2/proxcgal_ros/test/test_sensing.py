@@ -178,11 +178,9 @@ def test_parameters_tell_their_range_and_change_what_the_arm_does(
 
     # Slower, from now on, while it moves.
     handle = arm.send(goal(z=0.35))
-    arm.spin(1.0)
-    fast = arm.feedback[-1].linvel_norm
+    assert arm.until(lambda: arm.feedback and arm.feedback[-1].linvel_norm > 0.15, 10.0)
     assert change(max_linear=0.05) == []
-    assert fast > 0.15
-    assert arm.until(lambda: arm.feedback[-1].linvel_norm < 0.07, 3.0)
+    assert arm.until(lambda: 0.03 < arm.feedback[-1].linvel_norm < 0.07, 5.0)
 
     assert change(second_goal="refuse") == []
     assert not arm.send(goal(z=0.1)).accepted
