@@ -30,14 +30,13 @@ def spinning(arguments: list[str]) -> Iterator[tuple[Executor, Callable[[], bool
         ended = True
 
     rclpy.init(args=arguments, signal_handler_options=rclpy.SignalHandlerOptions.NO)
-    before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
+    for number in (signal.SIGINT, signal.SIGTERM):  # for good: the process ends after this
+        signal.signal(number, end)
     executor: Executor = SingleThreadedExecutor() if EventsExecutor is None else EventsExecutor()
     try:
         yield executor, lambda: rclpy.ok() and not ended
     except ExternalShutdownException:
         pass
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
         executor.shutdown()
         rclpy.try_shutdown()

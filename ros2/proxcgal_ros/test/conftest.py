@@ -194,12 +194,17 @@ def client(domain: int) -> Iterator[Client]:
         client.close()
 
 
+def joint_bounds(hold: float, stop: float) -> tuple[str, ...]:
+    """The node's arguments for other ages [s] of the joint state than 0.02 and 0.1."""
+    keys = [
+        f"'controller.monitor.joints_{k}_after={v}'" for k, v in (("hold", hold), ("stop", stop))
+    ]
+    return ("--ros-args", "-p", f"set:=[{', '.join(keys)}]")
+
+
 #: For tests that are not about joint states: a busy machine stands still for longer than a robot's
 #: may. The node's own bounds are 20 and 100 ms.
-PATIENT = (
-    "--ros-args", "-p",
-    "set:=['controller.monitor.joints_hold_after=0.5', 'controller.monitor.joints_stop_after=3.0']",
-)  # fmt: skip
+PATIENT = joint_bounds(0.5, 3.0)
 
 
 def goal(x: float = 0.0, y: float = 0.0, z: float = 0.0, **fields: Any) -> MoveRobot.Goal:
