@@ -345,7 +345,7 @@ class JointRobotServer:
     def _begin(self, active: _Active) -> None:
         """The arm stands where the goal begins: from here on it is followed."""
         T_WT = goal_pose(active.goal, np.asarray(self.robot.tool_pose(self._q)))
-        self._setup = replace(self._setup, goal=T_WT)
+        self._setup = replace(self._setup, goals=(T_WT,))
         active.T_WT = T_WT
         active.watch = GoalWatch(self._scenario.finish, T_WT)
         active.state = "executing"

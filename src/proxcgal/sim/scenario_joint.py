@@ -38,9 +38,7 @@ class Finish(Section):
 class JointScenario(Scenario):
     """One goal for the whole robot, from each of several initial configurations."""
 
-    kind: Literal["joint"] = Field(  # type: ignore[assignment]
-        description="what kind of scene this is"
-    )
+    kind: Literal["joint"] = Field(description="what kind of scene this is")
     q0: tuple[float, ...] = Field(
         (), description="[rad] or [m] joint positions at 0 s, instead of those of `initial`"
     )
