@@ -187,8 +187,9 @@ void Perception::keep(Sensor& sensor, int begin, int end) {
 /// What the scan says of the space before its sensor, and what of its last scan is to leave.
 void Perception::look(const Scan& scan, double stamp, const Pose& T_WS, Sensor& sensor) {
   sensor.leaves = true;
-  sensor.n_left = sensor.n_kept;
-  for (int i = 0; i < sensor.n_kept; ++i) {
+  sensor.n_left = sensor.doubtful ? 0 : sensor.n_kept;
+  sensor.doubtful = freshness_.suspect(static_cast<std::size_t>(scan.sensor));
+  for (int i = 0; i < sensor.n_left; ++i) {
     const auto at = static_cast<std::size_t>(i);
     sensor.left[at] = {
         sensor.kept_W[at], sensor.stamp, sensor.tolerance[at], {scan.sensor, sensor.zone[at]}};
@@ -220,6 +221,8 @@ void Perception::let_go(std::size_t id) {
   Sensor& sensor = sensors_[id];
   if (!sensor.leaves) return;
   sensor.leaves = false;
+  // A payload that is stuck shows neither what is there nor what is gone.
+  if (sensor.doubtful) return;
   if (motion_) {
     motion_->see(sensor.stamp,
                  std::span(sensor.kept_W).first(static_cast<std::size_t>(sensor.n_kept)));

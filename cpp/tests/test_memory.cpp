@@ -279,6 +279,35 @@ TEST_F(WithMemory, WhereTheArmIsNothingIsRemembered) {
   }
 }
 
+TEST_F(WithMemory, AStuckPayloadClearsNothingAndIsNotRememberedOnceItEnds) {
+  Skin twice = test::ring(2);  // both look the same way
+  twice.mounts[1].T_LS = twice.mounts[0].T_LS;
+  Controller law(robot, twice, config());
+  const auto told = [](int sensor, int index, double range, int zones) {
+    Scan scan{.sensor = sensor, .counter = static_cast<std::uint32_t>(index)};
+    scan.stamp = 0.07 * index;
+    scan.ranges.fill(range);
+    scan.status.fill(0);  // tells nothing
+    std::fill_n(scan.status.begin(), zones, std::uint8_t{5});
+    return scan;
+  };
+  const auto remembered = [&] { return law.cloud_W().rows() - law.seen_points(); };
+  constexpr int lost = 10, over = 16;
+  for (int i = 0; i < over; ++i) {
+    // The first sees something that comes slowly, then only a corner of it; the other is stuck.
+    const std::vector<Scan> scans{told(0, i, 0.3 - 1e-3 * i, i < lost ? kZones : 1),
+                                  told(1, i, 0.9, kZones)};
+    law.tick(0.07 * i, q, scans, goal);
+    if (i >= lost) {
+      EXPECT_GT(remembered(), 20) << i;
+    }
+  }
+  const Eigen::Index before = remembered();
+  const std::vector<Scan> ends{told(0, over, 0.2, 1), told(1, over, 0.9, 1)};
+  law.tick(0.07 * over, q, ends, goal);
+  EXPECT_EQ(remembered(), before);
+}
+
 TEST_F(WithMemory, WithoutItEverythingIsAsItWas) {
   ControllerConfig off;
   off.memory = MemoryConfig{.memory_s = 0.0};
