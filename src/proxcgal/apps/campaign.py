@@ -56,7 +56,6 @@ class CampaignOptions:
     faults: every fault of docs/reliability.md while the arm moves, on two robots: is the mode
     right, how soon, does the arm recover?
     joint: the 12-joint robot's scenes from each start, with each task on and off, known and sensed.
-
     walkthrough: random operators and paths guide the painting arm, a quarter of them within bounds;
     does the guard trip at once and on nothing else, how does the arm stop?
     hri: virtual subjects at two assembly tasks beside the arm, every subject with all controllers,
