@@ -227,6 +227,19 @@ TEST(Motion, WhatWasNotSeenForAWhileHasNoVelocity) {
   EXPECT_EQ(motion.velocity_W(0.31, Vector3(0, 0, -0.1)), Vector3(Vector3::Zero()));
 }
 
+TEST(Motion, ASensorWithOldStampsHidesNothingFromIt) {
+  Motion motion(MotionConfig{}, 2);
+  Random random(10);
+  for (int scan = 0; scan < 4; ++scan) {
+    std::vector<Vector3> points;
+    for (int i = 0; i < 40; ++i)
+      points.emplace_back(random.uniform(-0.1, 0.1), random.uniform(-0.1, 0.1), -0.5 * scan / 15.0);
+    motion.see(scan / 15.0, points);
+    motion.see(scan / 15.0 - 0.4, points);
+  }
+  EXPECT_GT(motion.velocity_W(0.21, Vector3(0, 0, -0.1)).norm(), 0.4);
+}
+
 /// A controller with memory on the test arm, and a wall before all its sensors that goes away.
 struct WithMemory : testing::Test {
   static ControllerConfig config() { return {.memory = MemoryConfig{}, .motion = MotionConfig{}}; }

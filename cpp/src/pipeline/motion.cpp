@@ -83,7 +83,7 @@ void Motion::Impl::fill(double time, const Vector3& velocity, double age) {
   for (std::size_t back = 1; back <= batches.size(); ++back) {
     const std::size_t at = (next + batches.size() - back) % batches.size();
     const Batch& batch = batches[at];
-    if (!(time - batch.stamp <= age)) break;
+    if (!(time - batch.stamp <= age)) continue;  // one sensor may be late: not all behind it are
     const Eigen::Vector3f c = (anchor_W + velocity * (batch.stamp - time)).cast<float>();
     if (!((c - c.cwiseMax(batch.low).cwiseMin(batch.high)).squaredNorm() <= radius * radius))
       continue;
