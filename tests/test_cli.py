@@ -109,6 +109,8 @@ def test_scenarios_and_robots_are_listed_with_a_line_each(call: Call) -> None:
         (["run", "front_plane", "--set", "duration"], ["key.sub=value"]),
         (["run", "front_plane", "--robot", "panda"], ["q0 has 6 values"]),
         (["run", "front_plane", "--controller", "ws"], ["ws"]),
+        (["run", "walkthrough_teach", "--controller", "sm"], ["--controller", "no controllers"]),
+        (["run", "front_plane", "--subject", "3"], ["--subject 3", "no operator"]),
         (["run", "front_plane", "--seed", "-1"], ["seed", "-1"]),
         (["run", "front_plane", "--workers", "0"], ["--workers 0", "1 or more"]),
         (["run"], ["SCENARIO"]),
