@@ -83,3 +83,13 @@ def test_a_path_sees_more_than_its_end_and_the_share_never_rises_with_time(
     assert shares[0] == shares[1] > shares[2] == shares[3] > 0.1
     alone = last_seen(setup, volume.points_W, [1.0], [setup.q0])
     assert (np.isinf(alone) == (volume.ages > 0.0)).all()
+
+
+def test_beside_a_person_the_closest_points_are_theirs_whatever_else_is_sensed(
+    ur10e: px.Robot,
+) -> None:
+    panel = 'obstacle=[{name="panel",size=[1.4,0.02,1.2],position=[0.4,-0.4,0.4]}]'
+    setup = Setup.of(load_scenario("hri_task1", ["duration=0.5", panel]), ur10e)
+    elapsed = 0.01 * np.arange(50)
+    q = np.tile(setup.q0, (50, 1))
+    assert coverage_of(setup, q, elapsed) == Coverage(0.0, 0.0, 0.0, 1.0)  # they are far

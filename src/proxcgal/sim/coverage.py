@@ -49,20 +49,20 @@ def coverage_of(setup: Setup, q: Array, elapsed: Array) -> Coverage:
         q: (n, n_q) posture of each tick.
         elapsed: (n,) [s] since the run began.
     """
-    if not setup.scene.solids or not len(elapsed):
+    if not setup.measured.solids or not len(elapsed):
         return NO_COVERAGE
     memory_s = setup.scenario.controller.memory.memory_s
     scan_s = 1.0 / setup.scenario.simulation.sensor_hz
     step = max(round(EVERY_S / (elapsed[1] - elapsed[0])) if len(elapsed) > 1 else 1, 1)
     moments, postures = elapsed[::step], q[::step]
-    truth, names = Truth(setup.robot, setup.scene), list(setup.scene.names)
+    truth, names = Truth(setup.robot, setup.measured), list(setup.measured.names)
     solids = np.zeros(len(moments), np.intp)
     points_O = np.zeros((len(moments), 3))  # on their solids, which may move
     for row, (moment, posture) in enumerate(zip(moments, postures, strict=True)):
         nearest = truth.nearest(posture, moment)
         assert nearest.obstacle_W is not None
         solids[row] = names.index(nearest.obstacle)
-        T_OW = inverse(setup.scene.poses(moment))[solids[row]]
+        T_OW = inverse(setup.measured.poses(moment))[solids[row]]
         points_O[row] = placed(T_OW, nearest.obstacle_W)
     seen = _last_seen(setup, q, elapsed, moments, solids, points_O)
     ages = moments - seen
@@ -93,7 +93,7 @@ def _last_seen(
         if not len(open_rows):
             continue
         posture = np.array([np.interp(stamp, elapsed, joint) for joint in q.T])
-        T_WO = setup.scene.poses(stamp)[solids[open_rows]]
+        T_WO = setup.measured.poses(stamp)[solids[open_rows]]
         points_W = np.einsum("nij,nj->ni", T_WO[:, :3, :3], points_O[open_rows]) + T_WO[:, :3, 3]
         seen[open_rows[eyes.see(posture, points_W, stamp)]] = stamp
     return seen
