@@ -1,6 +1,7 @@
 """Goals for the 12-joint robot: refused before anything moves, or ended exactly once."""
 
 import math
+import time as clock
 
 import numpy as np
 import pytest
@@ -65,6 +66,13 @@ def test_a_goal_held_off_by_an_obstacle_is_aborted_with_what_holds_it() -> None:
         ({"translation": (1, 2)}, "must be three finite numbers"),
         ({"translation": "abc"}, "must be three finite numbers"),
         ({"translation": (10**400, 0, 0)}, "must be three finite numbers"),
+        ({"translation": (10**5000, 0, 0)}, "must be three finite numbers"),
+        ({"translation": (1e308, 1e308, 0)}, r"would be at \(1e\+308, 1e\+308, 0\) m, inf m from"),
+        (
+            {"translation": (1e308, 1e308, 1e308), "frame": "end_effector"},
+            r"would be at .{5,60} m, inf m from",
+        ),
+        ({"translation": REACHED, "init": ["free"]}, "init = .*: there are free, jl, mob_mob"),
         (
             {"translation": REACHED, "init": "folded"},
             "init = 'folded': there are free, jl, mob_mob",
@@ -132,6 +140,56 @@ def test_tasks_change_by_name_between_goals_only() -> None:
         arm.send_goal(px.JointGoal(translation=REACHED))
         with pytest.raises(px.ConfigError, match="goal 1 is being executed"):
             arm.set_tasks(["full"])
+
+
+def test_a_stop_outlives_a_change_of_tasks_and_a_goal_that_waits_to_begin() -> None:
+    with server() as arm:
+        arm.send_goal(px.JointGoal(translation=REACHED))
+        for _ in range(50):
+            arm.step()
+        waiting = arm.send_goal(px.JointGoal(translation=REACHED, init="jl"))
+        # Its controller is told once that the joints are not numbers.
+        arm._law.tick_known(0.51, np.full(12, np.nan), np.zeros((0, 3)), np.eye(4))
+        for _ in range(200):
+            arm.step()
+        end = arm.result(waiting)
+        assert end is not None
+        assert end.outcome == "aborted"
+        assert "the monitor stopped the arm" in end.reason
+        with pytest.raises(px.ConfigError, match="the monitor has stopped the arm"):
+            arm.set_tasks(["thesis"])
+        with pytest.raises(px.GoalRefusedError, match="the monitor has stopped the arm"):
+            arm.send_goal(px.JointGoal(translation=REACHED))
+        assert arm.reset()
+        arm.set_tasks(["thesis"])
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_goal_ends_when_the_thread_that_makes_the_ticks_fails() -> None:
+    class Failing(px.JointRobotServer):  # type: ignore[misc, valid-type]
+        def step(self) -> None:
+            raise RuntimeError("no more")
+
+    overrides = ["simulation.control_hz=100.0", "simulation.known_spacing=0.05"]
+    with Failing("joint_free", overrides, robot=robot()) as arm:
+        number = arm.send_goal(px.JointGoal(translation=REACHED))
+        arm.start()
+        deadline = clock.monotonic() + 10.0
+        while arm.result(number) is None and clock.monotonic() < deadline:
+            clock.sleep(0.01)
+        end = arm.result(number)
+        assert end is not None
+        assert (end.outcome, end.reason) == ("aborted", "the server has failed: no more")
+        with pytest.raises(px.GoalRefusedError, match="the server has failed: no more"):
+            arm.send_goal(px.JointGoal(translation=REACHED))
+
+
+def test_nobody_waits_for_a_goal_that_never_was() -> None:
+    with server() as arm:
+        arm.send_goal(px.JointGoal(translation=REACHED))
+        before = arm.q
+        assert arm.wait(99) is None
+        np.testing.assert_array_equal(arm.q, before)
 
 
 def test_goals_in_the_tools_frame_are_turned_with_it() -> None:

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -55,6 +56,16 @@ def test_every_scene_start_and_stack_is_run_known_and_every_seed_sensed() -> Non
 def test_a_scene_of_another_kind_is_refused() -> None:
     with pytest.raises(ConfigError, match="kind = 'static'; needs 'joint'"):
         KIND.plan(Wishes(runs=1, seed=0, scenarios=("front_plane",)))
+
+
+@pytest.mark.parametrize("command", [("run", "joint_free"), ("campaign", "joint")])
+def test_arms_that_there_are_not_are_refused_before_anything_runs(
+    call: Callable[..., Any], command: tuple[str, ...]
+) -> None:
+    answer = call(*command, "--quiet", "--set", *SHORT, "controller.macro_joints=12")
+    assert answer.code == 2
+    assert "controller.macro_joints = 12: kr150_ur10e has 12 joints" in answer.err
+    assert not list(Path().rglob("*.*"))  # nothing is written
 
 
 def test_what_a_task_costs_and_buys_is_said_from_the_numbers() -> None:

@@ -143,3 +143,19 @@ def test_control_meshes_are_taken_over_as_they_are(kr150: px.Robot) -> None:
 def test_a_full_mesh_is_never_the_coarse_one() -> None:
     robot = px.attach_mesh(px.load_robot("ur10e"), "forearm_link", ellipsoid(np.full(3, 0.05)))
     assert len(robot.full_mesh("forearm_link")[0]) > 5 * len(robot.mesh("forearm_link")[0])
+
+
+@pytest.mark.parametrize(
+    ("pose", "prefix", "said"),
+    [
+        ("abc", "x_", "pose = abc; a finite"),
+        (np.eye(3), "x_", "pose has shape"),
+        (np.eye(4), 3, "prefix = 3; a text, or two"),
+        (np.eye(4), ("a", "b", "c"), "prefix = .*; a text, or two"),
+    ],
+)
+def test_what_no_robot_can_be_hung_by_is_told(
+    ur10e: px.Robot, pose: object, prefix: object, said: str
+) -> None:
+    with pytest.raises(px.ModelError, match=said):
+        px.attach(ur10e, "tool0", ur10e, pose, prefix)  # type: ignore[arg-type]

@@ -14,7 +14,7 @@ from rclpy.task import Future
 
 from proxcgal_ros import topics
 from proxcgal_ros.convert import header
-from proxcgal_ros.goals import BASE, Goal, GoalRefusedError, GoalServer, Result
+from proxcgal_ros.goals import BASE, GoalRefusedError, GoalResult, GoalServer, JointGoal
 
 
 @dataclass(slots=True)
@@ -65,7 +65,7 @@ class MoveRobotAction:
         turn = request.rotation
         rpy = None if request.keep_orientation else (turn.roll, turn.pitch, turn.yaw)
         place = request.translation
-        goal = Goal(
+        goal = JointGoal(
             translation=(place.x, place.y, place.z), rpy=rpy, frame=request.frame or BASE,
             init=request.init_config_name,
         )  # fmt: skip
@@ -95,7 +95,7 @@ class MoveRobotAction:
         pursued = next(
             one for one in self._pursued.values() if one.handle.goal_id == handle.goal_id
         )
-        result: Result = await pursued.ended
+        result: GoalResult = await pursued.ended
         if result.outcome == "succeeded":
             handle.succeed()
         elif result.outcome == "cancelled" and handle.is_cancel_requested:

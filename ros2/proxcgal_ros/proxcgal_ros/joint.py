@@ -13,7 +13,7 @@ from proxcgal.apps import joint_server
 from proxcgal_ros import topics
 from proxcgal_ros.action import MoveRobotAction
 from proxcgal_ros.convert import header, joint_message
-from proxcgal_ros.goals import Feedback, Goal, GoalRefusedError, Result
+from proxcgal_ros.goals import GoalFeedback, GoalResult, JointGoal
 
 JOINTS_HZ = 50.0
 
@@ -25,38 +25,22 @@ class JointGoals:
         """Args: who pursues the goals."""
         self._server = server
 
-    def send_goal(self, goal: Goal) -> int:
+    def send_goal(self, goal: JointGoal) -> int:
         """Its number. Raises: GoalRefusedError."""
-        asked = joint_server.JointGoal(
-            translation=goal.translation, rpy=goal.rpy, frame=goal.frame, init=goal.init
-        )
-        try:
-            return self._server.send_goal(asked)
-        except joint_server.GoalRefusedError as refusal:
-            raise GoalRefusedError(str(refusal)) from None
+        return self._server.send_goal(goal)
 
     def cancel(self, number: int) -> bool:
         """False where it has ended already."""
         return self._server.cancel(number)
 
-    def feedback(self, number: int) -> Feedback | None:
+    def feedback(self, number: int) -> GoalFeedback | None:
         """None where it is not pursued."""
         told = self._server.feedback()
-        if told is None or told.goal != number:
-            return None
-        return Feedback(
-            told.state, told.time_s, told.linvel_norm, told.angvel_norm, told.position_error_m,
-            told.angle_error_rad,
-        )  # fmt: skip
+        return told if told is not None and told.goal == number else None
 
-    def result(self, number: int) -> Result | None:
+    def result(self, number: int) -> GoalResult | None:
         """None while it has not ended."""
-        told = self._server.result(number)
-        if told is None:
-            return None
-        return Result(
-            told.outcome, told.reason, told.time_s, told.position_error_m, told.angle_error_rad
-        )
+        return self._server.result(number)
 
 
 class JointNode(Node):

@@ -14,14 +14,16 @@ from proxcgal.models import Robot
 from proxcgal.sim.ticks import TickInput, TickResult
 from proxcgal_ros.goals import (
     BASE,
-    Feedback,
-    Goal,
+    GoalFeedback,
     GoalRefusedError,
+    GoalResult,
+    JointGoal,
     Outcome,
-    Result,
+    State,
     goal_pose,
     goal_problems,
     pose_errors,
+    reach_of,
     reach_problem,
 )
 
@@ -49,7 +51,7 @@ class _Active:
     number: int
     T_WT: Array
     begun: float
-    state: str = "executing"
+    state: State = "executing"
     cancelled: float = math.inf  # [s] when
 
 
@@ -62,18 +64,19 @@ class LiveGoals:
     def __init__(self, robot: Robot, base_frame: str, rules: Rules) -> None:
         """Args: the frame that its base is called by, beside the thesis's name."""
         self._robot = robot
+        self._reach = reach_of(robot)
         self._base_frames = (BASE, base_frame)
         self.rules = rules
         self._count = 0
         self._active: _Active | None = None
-        self._results: OrderedDict[int, Result] = OrderedDict()
+        self._results: OrderedDict[int, GoalResult] = OrderedDict()
         self._held: Array | None = None
         self._tool: Array | None = None
         self._q: Array | None = None
         self._time = 0.0
         self._last: TickResult | None = None
 
-    def send_goal(self, goal: Goal) -> int:
+    def send_goal(self, goal: JointGoal) -> int:
         """Its number. Raises: GoalRefusedError with every reason."""
         problems = goal_problems(goal, self._base_frames)
         if goal.init:
@@ -88,7 +91,7 @@ class LiveGoals:
             problems.append(f"goal {self._active.number} is being pursued")
         if not problems and self._tool is not None:
             T_WT = goal_pose(goal, self._tool)
-            far = reach_problem(self._robot, T_WT)
+            far = reach_problem(self._reach, T_WT)
             if far is None:
                 self._count += 1
                 if self._active is not None:
@@ -106,19 +109,19 @@ class LiveGoals:
         active.state, active.cancelled = "cancelling", self._time
         return True
 
-    def feedback(self, number: int) -> Feedback | None:
+    def feedback(self, number: int) -> GoalFeedback | None:
         """How it is doing; None where it is not pursued."""
         active = self._active
         if active is None or active.number != number or self._tool is None or self._q is None:
             return None
         qd = np.zeros_like(self._q) if self._last is None else self._last.qd
         velocity = np.asarray(self._robot.tool_jacobian(self._q)) @ qd
-        return Feedback(
-            active.state, self._time - active.begun, float(np.linalg.norm(velocity[:3])),
+        return GoalFeedback(
+            number, active.state, self._time - active.begun, float(np.linalg.norm(velocity[:3])),
             float(np.linalg.norm(velocity[3:])), *pose_errors(self._tool, active.T_WT),
         )  # fmt: skip
 
-    def result(self, number: int) -> Result | None:
+    def result(self, number: int) -> GoalResult | None:
         """How it ended; None while it has not."""
         return self._results.get(number)
 
@@ -170,9 +173,10 @@ class LiveGoals:
         assert self._tool is not None
         assert active.number not in self._results
         self._held = self._tool
-        self._results[active.number] = Result(
-            outcome, reason, self._time - active.begun, *pose_errors(self._tool, active.T_WT)
-        )
+        self._results[active.number] = GoalResult(
+            active.number, outcome, reason, self._time - active.begun,
+            *pose_errors(self._tool, active.T_WT),
+        )  # fmt: skip
         while len(self._results) > KEPT_RESULTS:
             self._results.popitem(last=False)
         self._active = None

@@ -34,7 +34,7 @@ from proxcgal.sim.ticks import Tick, TickInput, TickResult, TickTruth
 Array = NDArray[np.float64]
 State = Literal["starting", "executing", "cancelling", "succeeded", "aborted", "cancelled"]
 
-FRAMES = ("kuka_base", "end_effector")
+BASE, END_EFFECTOR = FRAMES = ("kuka_base", "end_effector")
 AT_REST = 1e-3  # [rad/s] of every joint
 STOPPED_AFTER = 3.0  # [s] a cancelled goal has ended, whatever avoidance still moves
 KEPT_RESULTS = 1000  # the oldest are forgotten
@@ -50,7 +50,7 @@ class JointGoal:
 
     translation: Sequence[float]  # [m] (3,) r of (4.1)
     rpy: Sequence[float] | None = None  # [rad] roll, pitch, yaw; None: orientation kept
-    frame: str = "kuka_base"  # that both are given in: kuka_base or end_effector
+    frame: str = BASE  # that both are given in: kuka_base or end_effector
     init: str = ""  # configuration to begin from; "": where the arm stands
 
 
@@ -139,6 +139,7 @@ class JointRobotServer:
         self._law = self._made()
         self._held = np.asarray(self._setup.robot.tool_pose(self._q))
         self._thread: threading.Thread | None = None
+        self._failure = ""  # of the thread, after which nothing moves any more
         self._ending = threading.Event()
 
     @property
@@ -170,13 +171,16 @@ class JointRobotServer:
             off: of these, what is left out.
 
         Raises:
-            ConfigError: an unknown name, or a goal is being executed.
+            ConfigError: an unknown name, a goal is being executed, or the monitor has stopped
+                the arm.
         """
         from proxcgal.sim.scenario import change_scenario
 
         with self._lock:
             if self._active is not None:
                 raise ConfigError(f"tasks: goal {self._active.number} is being executed")
+            if self._stopped:  # a new controller would forget it
+                raise ConfigError("tasks: the monitor has stopped the arm; a reset comes first")
             changes = [f"controller.{k}={list(v)!r}" for k, v in (("tasks", tasks), ("off", off))]
             changed = change_scenario(self._setup.scenario, "tasks", changes)
             self._setup = replace(self._setup, scenario=changed)
@@ -244,7 +248,8 @@ class JointRobotServer:
         """
         begin = self._time
         while (found := self.result(number)) is None and self._time - begin < timeout:
-            if self._active is None:
+            active = self._active
+            if active is None or active.number != number:  # it has ended, or never was
                 return self.result(number)
             if self._thread is None:
                 self.step()
@@ -255,7 +260,10 @@ class JointRobotServer:
     def reset(self) -> bool:
         """Leaves a STOP of the monitor, once its cause is gone; no message of a client does."""
         with self._lock:
-            return bool(self._law.reset())
+            left = bool(self._law.reset())
+            if left:
+                self._last = None  # it still says STOP
+            return left
 
     def start(self) -> None:
         """Makes the ticks in real time, in a thread, until `close`."""
@@ -289,10 +297,17 @@ class JointRobotServer:
 
     def _spin(self) -> None:
         due = clock.monotonic()
-        while not self._ending.is_set():
-            self.step()
-            due = max(due + self.period, clock.monotonic() - 0.1)  # what is lost stays lost
-            self._ending.wait(max(due - clock.monotonic(), 0.0))
+        try:
+            while not self._ending.is_set():
+                self.step()
+                due = max(due + self.period, clock.monotonic() - 0.1)  # what is lost stays lost
+                self._ending.wait(max(due - clock.monotonic(), 0.0))
+        except Exception as error:  # else a goal would wait for its end for ever
+            with self._lock:
+                self._failure = f"the server has failed: {error}"
+                if self._active is not None:
+                    self._end("aborted", self._failure)
+            raise
 
     def _made(self) -> _core.Controller:
         self._ticks, self._last = 0, None
@@ -311,7 +326,7 @@ class JointRobotServer:
         scenario = self._scenario
         q = None
         if goal.init:
-            q = scenario.configurations.get(goal.init)
+            q = scenario.configurations.get(goal.init) if isinstance(goal.init, str) else None
             if q is None:
                 problems.append(
                     f"init = {goal.init!r}: there are {', '.join(scenario.configurations)}"
@@ -321,20 +336,21 @@ class JointRobotServer:
                 problems += [f"init = {goal.init!r}: {line}" for line in outside]
         if self._second == "refuse" and self._active is not None:
             problems.append(f"goal {self._active.number} is being executed")
-        if self._last is not None and self._last.mode == _STOP:
+        if self._failure:
+            problems.append(self._failure)
+        if self._stopped:
             problems.append("the monitor has stopped the arm; only a reset where it runs helps")
         if problems:
             return problems
         start = self._q if q is None else np.array(q)
-        T_WT = goal_pose(goal, np.asarray(self.robot.tool_pose(start)))
-        base_W, farthest = self._reach
-        if (far := float(np.linalg.norm(T_WT[:3, 3] - base_W))) > farthest:
-            x, y, z = T_WT[:3, 3]
-            return [
-                f"translation: the tool would be at ({x:.3f}, {y:.3f}, {z:.3f}) m, {far:.3f} m "
-                f"from the first joint; no posture reaches beyond {farthest:.3f} m"
-            ]
-        return []
+        with np.errstate(over="ignore"):  # what overflows is out of reach
+            T_WT = goal_pose(goal, np.asarray(self.robot.tool_pose(start)))
+        far = reach_problem(self._reach, T_WT)
+        return [far] if far else []
+
+    @property
+    def _stopped(self) -> bool:
+        return self._last is not None and self._last.mode == _STOP
 
     @property
     def _scenario(self) -> JointScenario:
@@ -384,12 +400,12 @@ class JointRobotServer:
         if active.state == "cancelling":
             if resting or self._time - active.cancelled > STOPPED_AFTER:
                 self._end("cancelled", "cancelled by the client")
+        elif self._stopped and self._last is not None:
+            found = ", ".join(sorted({f.reason for f in self._last.findings}))
+            self._end("aborted", f"the monitor stopped the arm: {found}")
         elif active.state == "starting":
             if resting:
                 self._place(active)
-        elif self._last is not None and self._last.mode == _STOP:
-            found = ", ".join(sorted({f.reason for f in self._last.findings}))
-            self._end("aborted", f"the monitor stopped the arm: {found}")
         elif active.watch is not None:
             ending = active.watch(self._time - active.begun, T_WT)
             if ending is not None:
@@ -427,18 +443,18 @@ _STOP = 3  # mode
 
 
 def goal_pose(goal: JointGoal, T_WE: Array) -> Array:
-    """(4, 4) T_WT of a goal, the tool being at T_WE.
+    """(4, 4) T_WT of a goal, the tool being at T_WE; any frame but end_effector is the base.
 
     Source: [JR] (4.2) to (4.6); (4.6) forgets to rotate, so here it is r_ee + R_ee r_goal.
     """
     T_WT = np.eye(4)
     turn = None if goal.rpy is None else frames.rotation(goal.rpy)  # (4.2)
-    if goal.frame == "kuka_base":
-        T_WT[:3, :3] = T_WE[:3, :3] if turn is None else turn  # (4.3)
-        T_WT[:3, 3] = goal.translation  # (4.5)
-    else:
+    if goal.frame == END_EFFECTOR:
         T_WT[:3, :3] = T_WE[:3, :3] if turn is None else T_WE[:3, :3] @ turn  # (4.4)
         T_WT[:3, 3] = T_WE[:3, 3] + T_WE[:3, :3] @ np.asarray(goal.translation)  # (4.6), mended
+    else:
+        T_WT[:3, :3] = T_WE[:3, :3] if turn is None else turn  # (4.3)
+        T_WT[:3, 3] = goal.translation  # (4.5)
     return T_WT
 
 
@@ -454,6 +470,32 @@ def reach_of(robot: Robot) -> tuple[Array, float]:
     return (np.zeros(3) if row < 0 else np.asarray(joints[row].origin)[:3, 3]), length
 
 
+def reach_problem(reach: tuple[Array, float], T_WT: Array) -> str | None:
+    """Why no posture brings the tool there; None where one may.
+
+    Args:
+        reach: of the robot, see `reach_of`.
+        T_WT: (4, 4) of the goal.
+    """
+    base_W, farthest = reach
+    with np.errstate(over="ignore"):
+        far = float(np.linalg.norm(T_WT[:3, 3] - base_W))
+    if far <= farthest:
+        return None
+    x, y, z = T_WT[:3, 3]
+    return (
+        f"translation: the tool would be at ({x:.6g}, {y:.6g}, {z:.6g}) m, {far:.6g} m "
+        f"from the first joint; no posture reaches beyond {farthest:.3f} m"
+    )
+
+
+def _told(values: object) -> str:
+    try:
+        return str(values)[:80]
+    except ValueError:  # Python does not write integers of so many digits
+        return "?"
+
+
 def _three(name: str, values: object) -> str | None:
     """Why these are not three finite numbers; None where they are."""
     try:
@@ -465,5 +507,5 @@ def _three(name: str, values: object) -> str | None:
             raise TypeError
         finite = all(math.isfinite(value) for value in values)
     except (TypeError, OverflowError):
-        return f"{name} = {str(values)[:80]}: must be three finite numbers"
+        return f"{name} = {_told(values)}: must be three finite numbers"
     return None if finite else f"{name} = {list(values)}: must be finite"

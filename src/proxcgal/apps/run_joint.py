@@ -41,10 +41,12 @@ def run_joint(
     from proxcgal.apps.origin import origin
     from proxcgal.apps.report import write_report
     from proxcgal.apps.results import check, ready
+    from proxcgal.sim.arms import part
     from proxcgal.study.analysis import SELF_LIMIT_M, write_bytes, write_json, write_text
     from proxcgal.study.figures import png
     from proxcgal.study.joint_figures import scene_figure
     from proxcgal.study.joint_words import listings, verdicts
+    from proxcgal.study.trials import robot_of
 
     if scenario.q0:
         raise ConfigError(
@@ -53,6 +55,7 @@ def run_joint(
     starts = scenario.starts()
     for start in starts:
         check(start, controllers, quiet=quiet)
+        part(robot_of(start), start.controller.macro_joints, "macro")  # its table tells both arms
     ready([folder])
     jobs = [(start, name) for start in starts for name in controllers]
     for start, name in jobs:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from proxcgal.errors import GeometryError
+from proxcgal.errors import GeometryError, ModelError
 from proxcgal.models.joining import joined, rigid
 from proxcgal.models.meshes import check_mesh, clean, load_mesh
 from proxcgal.models.resolution import ControlMesh, control_mesh
@@ -32,9 +32,13 @@ def attach(
             for `robot`.
 
     Raises:
-        ModelError: no such link, a pose that is none, or names that are not unique in the end.
+        ModelError: no such link, a pose or prefix that is none, or names that are not unique in
+            the end.
     """
     prefixes = ("", prefix) if isinstance(prefix, str) else prefix
+    texts = isinstance(prefixes, tuple) and all(isinstance(text, str) for text in prefixes)
+    if not texts or len(prefixes) != 2:
+        raise ModelError(f"prefix = {prefix!r}; a text, or two, is needed")
     one, order = joined(robot.description, link, other.description, pose, prefixes)
     control = (*robot.control, *other.control)
     return Robot(one, [control[row] for row in order])

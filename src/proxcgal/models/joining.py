@@ -72,7 +72,10 @@ def rigid(pose: ArrayLike, what: str) -> Floats:
     Raises:
         ModelError: it is none.
     """
-    T = np.asarray(pose, dtype=np.float64)
+    try:
+        T = np.asarray(pose, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ModelError(f"{what} = {str(pose)[:80]}; a finite (4, 4) pose is needed") from None
     if T.shape != (4, 4) or not np.isfinite(T).all():
         raise ModelError(f"{what} has shape {T.shape}; a finite (4, 4) pose is needed")
     R = T[:3, :3]

@@ -8,6 +8,7 @@ from typing import Any
 import polars as pl
 
 from proxcgal.errors import ConfigError
+from proxcgal.sim.arms import part
 from proxcgal.sim.scenario import CONTROLLERS, load_scenario
 from proxcgal.sim.scenario_joint import JointScenario
 from proxcgal.sim.setup import Setup
@@ -68,6 +69,7 @@ def plan(wishes: Wishes) -> Campaign:
             raise ConfigError(f"--scenario {source}: there is another one named {plain(base.name)}")
         robot = robot_of(base)
         Setup.of(base, robot)
+        part(robot, base.controller.macro_joints, "macro")  # every run tells both arms
         scenes |= identity(base, robot)
 
         def trial(
