@@ -177,7 +177,6 @@ TEST(SafetyLogic, TorqueNeverReturnsByItself) {
     SafetyLogic logic(limits(), {.stop_time = 0.02});
     bool torque = false, button = true;
     double time = 0.0;
-    JointVector qd_last = JointVector::Zero(2);
     const double bad = random.uniform(0.0, 0.15), press = random.uniform(0.0, 0.9);
     const auto chance = [&](double share) { return random.uniform(0.0, 1.0) < share; };
     for (int i = 0; i < 40; ++i) {
@@ -199,7 +198,9 @@ TEST(SafetyLogic, TorqueNeverReturnsByItself) {
         ASSERT_EQ(out.violated, 0U) << "the cause is still there";
         ASSERT_LE(input.qd.cwiseAbs().maxCoeff(), 0.01) << "the arm moves";
       }
-      if (out.violated != 0U) ASSERT_FALSE(out.torque);
+      if (out.violated != 0U) {
+        ASSERT_FALSE(out.torque);
+      }
       cuts += static_cast<long>(torque && !out.torque);
       torque = out.torque;
     }
