@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from pydantic import BaseModel
 
+from proxcgal.apps.walkthrough import lines_of
 from proxcgal.errors import ConfigError, RecordingError
 from proxcgal.models.builtin import ga_ol
 from proxcgal.sim import toml
@@ -28,12 +29,14 @@ from proxcgal.sim.walk.keys import GuidedScenario, Leg, WalkScenario
 from proxcgal.sim.walk.log import WalkLog
 from proxcgal.sim.walk.playback import check_start, play
 from proxcgal.sim.walk.poses import read_poses
+from proxcgal.sim.walk.run import WalkResult
 from proxcgal.sim.walk.setup import PERIOD, WalkSetup
 from proxcgal.sim.walk.stops import STRETCHED, worst_stops
 from proxcgal.sim.walk.taught import TaughtPath, clean, to_csv, to_trajectory, tool_positions
-from proxcgal.sim.walk.teach import teach
+from proxcgal.sim.walk.teach import REACHED, teach
 from proxcgal.sim.walk.wish import Wish
 from proxcgal.study.ratings import read_ratings
+from proxcgal.study.walk_figures import trip_figure
 
 ROOT = Path(__file__).parents[1]
 DOCS, SCENARIOS = ROOT / "docs" / "walkthrough.md", ROOT / "docs" / "scenarios.md"
@@ -282,6 +285,7 @@ def test_a_scenario_survives_being_written_and_read(short: WalkSetup) -> None:
         ("skin.rings=[]", "a walk-through has no such table"),
         ("hand.stiffness=-1.0", "hand.stiffness"),
         ("guard.pairs=['link_9']", "must be one of link_1, link_2"),
+        ("guard.q_reference=[0, 9, 0, 0, 0, 0]", "must be within the joints' ranges"),
     ],
 )
 def test_bad_input_is_told_in_one_line(change: str, told: str) -> None:
@@ -355,6 +359,38 @@ def test_a_run_writes_what_the_experiment_asks_for(call: Callable[..., Any]) -> 
     files = {path.name for path in folder.iterdir()}
     assert files >= {"walkthrough.png", "taught.mcap", "scenario.toml", "run.json", "report.html"}
     assert "tcp_speed" in (folder / "report.html").read_text()
+
+
+def test_a_run_refuses_what_a_walkthrough_has_no_use_or_no_time_for(
+    call: Callable[..., Any],
+) -> None:
+    for options, told in (
+        (("--controller", "wb"), "--controller wb: walkthrough_teach has kind"),
+        (("--set", "duration=3"), "duration = 3 s: the wished path takes"),
+        (("--set", "duration=20"), "to teach by the hand-guiding rules"),
+    ):
+        answer = call("run", "walkthrough_teach", *options, "--quiet")
+        assert answer.code == 2
+        assert told in answer.err
+    assert not Path("out").exists()
+
+
+def test_a_hand_too_weak_for_its_path_is_told(taught: WalkLog) -> None:
+    assert taught.left_m is not None
+    assert taught.left_m <= REACHED
+    weak = teach(setup_of("walkthrough_teach", *SHORT, "hand.max_force=5.0"), seed=0)
+    assert weak.left_m is not None
+    assert weak.left_m > REACHED
+    summary = WalkResult(weak).summary()
+    assert f"let go {weak.left_m:.3f} m from the path's end" in lines_of(summary)[-1]
+
+
+def test_the_figure_of_a_trip_shows_the_quantity_that_tripped() -> None:
+    farther = "guard.q_reference=[0.0, 0.26, 0.52, 0.0, -0.785, 0.0]"  # tighter bounds on joints
+    log = teach(setup_of("walkthrough_overspeed", farther), seed=0)
+    assert [trip.function for trip in log.trips] == ["joint_speed"]
+    figure = trip_figure(log, title="")
+    assert figure.axes[0].get_ylabel() == "joint speed, of its bound [-]"
 
 
 def test_a_campaign_draws_the_same_operators_again_and_finds_no_false_trip(

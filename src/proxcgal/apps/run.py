@@ -99,6 +99,11 @@ def run_command(options: RunOptions, command: str) -> int:
             )
     scenario = load_scenario(options.scenario, overrides(options))
     if scenario.kind == "walkthrough":
+        if options.controller:
+            raise ConfigError(
+                f"--controller {' '.join(options.controller)}: {options.scenario} has kind = "
+                '"walkthrough", where a hand guides the arm: there is none to choose'
+            )
         return _run_walkthrough(scenario, options, command)
     controllers = tuple(dict.fromkeys(options.controller or scenario.controllers()))
     folder = options.out or Path("out") / scenario.name
