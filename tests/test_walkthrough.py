@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import polars as pl
 import pytest
 from pydantic import BaseModel
 
@@ -36,6 +37,7 @@ from proxcgal.sim.walk.taught import TaughtPath, clean, to_csv, to_trajectory, t
 from proxcgal.sim.walk.teach import REACHED, teach
 from proxcgal.sim.walk.wish import Wish
 from proxcgal.study.ratings import read_ratings
+from proxcgal.study.walk import figures
 from proxcgal.study.walk_figures import trip_figure
 
 ROOT = Path(__file__).parents[1]
@@ -404,3 +406,14 @@ def test_a_campaign_draws_the_same_operators_again_and_finds_no_false_trip(
         "compliant": 1, "overspeed": 1,
     }  # fmt: skip
     assert summary["stop_time_s"]["max"] <= 0.35
+
+
+def test_a_stop_over_its_bound_is_inside_the_campaigns_figure() -> None:
+    table = pl.DataFrame(
+        {"error": [None], "tripped": ["tcp_speed"], "wish": ["overspeed"], "stop_time_s": [0.6],
+         "stop_distance_m": [0.7]},
+        schema_overrides={"error": pl.String},
+    )  # fmt: skip
+    axes = figures(table)["stops.png"].axes
+    assert axes[0].get_xlim()[1] > 0.6
+    assert axes[1].get_xlim()[1] > 0.7
