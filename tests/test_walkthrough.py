@@ -4,11 +4,13 @@ import csv
 import io
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -375,6 +377,24 @@ def test_a_run_refuses_what_a_walkthrough_has_no_use_or_no_time_for(
         assert answer.code == 2
         assert told in answer.err
     assert not Path("out").exists()
+
+
+def test_an_arm_of_ones_own_runs_or_is_refused_before_anything_is_written(
+    call: Callable[..., Any], tmp_path: Path
+) -> None:
+    text = Path(str(files("proxcgal.models") / "ga_ol.toml")).read_text()
+    bare, five = tmp_path / "bare.toml", tmp_path / "five.toml"
+    bare.write_text(re.sub(r"(?m)^brake = .*$", "", text))
+    five.write_text(text.replace('joint = "joint_6"\n', ""))
+    answer = call("run", "walkthrough_overspeed", "--robot", str(bare), "--quiet")
+    assert answer.code == 2
+    assert "physics needs mass and brake of joint_1 (brake)" in answer.err
+    assert not Path("out").exists()
+    setup = setup_of(
+        "walkthrough_overspeed", f"robot={five}", "q0=[0.0, 0.26, 0.52, 0.0, -0.785]",
+        "guard.q_reference=[0.0, -0.35, 1.22, 0.0, -0.87]", "guard.accept=['joint_stop.joint_4']",
+    )  # fmt: skip
+    assert worst_stops(setup) == []
 
 
 def test_a_hand_too_weak_for_its_path_is_told(taught: WalkLog) -> None:
