@@ -4,18 +4,22 @@ import csv
 import io
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import polars as pl
 import pytest
 from pydantic import BaseModel
 
+from proxcgal.apps.walkthrough import lines_of
 from proxcgal.errors import ConfigError, RecordingError
 from proxcgal.models.builtin import ga_ol
 from proxcgal.sim import toml
@@ -28,12 +32,15 @@ from proxcgal.sim.walk.keys import GuidedScenario, Leg, WalkScenario
 from proxcgal.sim.walk.log import WalkLog
 from proxcgal.sim.walk.playback import check_start, play
 from proxcgal.sim.walk.poses import read_poses
+from proxcgal.sim.walk.run import WalkResult
 from proxcgal.sim.walk.setup import PERIOD, WalkSetup
 from proxcgal.sim.walk.stops import STRETCHED, worst_stops
 from proxcgal.sim.walk.taught import TaughtPath, clean, to_csv, to_trajectory, tool_positions
-from proxcgal.sim.walk.teach import teach
+from proxcgal.sim.walk.teach import REACHED, teach
 from proxcgal.sim.walk.wish import Wish
 from proxcgal.study.ratings import read_ratings
+from proxcgal.study.walk import figures
+from proxcgal.study.walk_figures import trip_figure
 
 ROOT = Path(__file__).parents[1]
 DOCS, SCENARIOS = ROOT / "docs" / "walkthrough.md", ROOT / "docs" / "scenarios.md"
@@ -282,6 +289,7 @@ def test_a_scenario_survives_being_written_and_read(short: WalkSetup) -> None:
         ("skin.rings=[]", "a walk-through has no such table"),
         ("hand.stiffness=-1.0", "hand.stiffness"),
         ("guard.pairs=['link_9']", "must be one of link_1, link_2"),
+        ("guard.q_reference=[0, 9, 0, 0, 0, 0]", "must be within the joints' ranges"),
     ],
 )
 def test_bad_input_is_told_in_one_line(change: str, told: str) -> None:
@@ -357,6 +365,56 @@ def test_a_run_writes_what_the_experiment_asks_for(call: Callable[..., Any]) -> 
     assert "tcp_speed" in (folder / "report.html").read_text()
 
 
+def test_a_run_refuses_what_a_walkthrough_has_no_use_or_no_time_for(
+    call: Callable[..., Any],
+) -> None:
+    for options, told in (
+        (("--controller", "wb"), "--controller wb: walkthrough_teach has kind"),
+        (("--set", "duration=3"), "duration = 3 s: the wished path takes"),
+        (("--set", "duration=20"), "to teach by the hand-guiding rules"),
+    ):
+        answer = call("run", "walkthrough_teach", *options, "--quiet")
+        assert answer.code == 2
+        assert told in answer.err
+    assert not Path("out").exists()
+
+
+def test_an_arm_of_ones_own_runs_or_is_refused_before_anything_is_written(
+    call: Callable[..., Any], tmp_path: Path
+) -> None:
+    text = Path(str(files("proxcgal.models") / "ga_ol.toml")).read_text()
+    bare, five = tmp_path / "bare.toml", tmp_path / "five.toml"
+    bare.write_text(re.sub(r"(?m)^brake = .*$", "", text))
+    five.write_text(text.replace('joint = "joint_6"\n', ""))
+    answer = call("run", "walkthrough_overspeed", "--robot", str(bare), "--quiet")
+    assert answer.code == 2
+    assert "physics needs mass and brake of joint_1 (brake)" in answer.err
+    assert not Path("out").exists()
+    setup = setup_of(
+        "walkthrough_overspeed", f"robot={five}", "q0=[0.0, 0.26, 0.52, 0.0, -0.785]",
+        "guard.q_reference=[0.0, -0.35, 1.22, 0.0, -0.87]", "guard.accept=['joint_stop.joint_4']",
+    )  # fmt: skip
+    assert worst_stops(setup) == []
+
+
+def test_a_hand_too_weak_for_its_path_is_told(taught: WalkLog) -> None:
+    assert taught.left_m is not None
+    assert taught.left_m <= REACHED
+    weak = teach(setup_of("walkthrough_teach", *SHORT, "hand.max_force=5.0"), seed=0)
+    assert weak.left_m is not None
+    assert weak.left_m > REACHED
+    summary = WalkResult(weak).summary()
+    assert f"let go {weak.left_m:.3f} m from the path's end" in lines_of(summary)[-1]
+
+
+def test_the_figure_of_a_trip_shows_the_quantity_that_tripped() -> None:
+    farther = "guard.q_reference=[0.0, 0.26, 0.52, 0.0, -0.785, 0.0]"  # tighter bounds on joints
+    log = teach(setup_of("walkthrough_overspeed", farther), seed=0)
+    assert [trip.function for trip in log.trips] == ["joint_speed"]
+    figure = trip_figure(log, title="")
+    assert figure.axes[0].get_ylabel() == "joint speed, of its bound [-]"
+
+
 def test_a_campaign_draws_the_same_operators_again_and_finds_no_false_trip(
     call: Callable[..., Any],
 ) -> None:
@@ -368,3 +426,14 @@ def test_a_campaign_draws_the_same_operators_again_and_finds_no_false_trip(
         "compliant": 1, "overspeed": 1,
     }  # fmt: skip
     assert summary["stop_time_s"]["max"] <= 0.35
+
+
+def test_a_stop_over_its_bound_is_inside_the_campaigns_figure() -> None:
+    table = pl.DataFrame(
+        {"error": [None], "tripped": ["tcp_speed"], "wish": ["overspeed"], "stop_time_s": [0.6],
+         "stop_distance_m": [0.7]},
+        schema_overrides={"error": pl.String},
+    )  # fmt: skip
+    axes = figures(table)["stops.png"].axes
+    assert axes[0].get_xlim()[1] > 0.6
+    assert axes[1].get_xlim()[1] > 0.7

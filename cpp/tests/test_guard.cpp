@@ -120,6 +120,55 @@ TEST(SafetyLogic, AClockThatStandsStillDoesNotHideALongStop) {
   EXPECT_TRUE(logic.output().overrun);
 }
 
+TEST(SafetyLogic, AnArmThatItsWeightMovesUntilTheBrakesHaveClosedStopsInTime) {
+  SafetyLogic logic = running();
+  SafetyInput input = fine(0.004);
+  input.distance_ok = false;
+  logic.cycle(input);
+  EXPECT_EQ(logic.cycle(fine(0.005)).state, TorqueState::kOff) << "it stood";
+  for (int i = 6; i < 60; ++i) {
+    SafetyInput moving = fine(0.001 * i);
+    moving.qd[0] = 0.1;
+    EXPECT_EQ(logic.cycle(moving).state, TorqueState::kStopping);
+  }
+  const SafetyOutput& out = logic.cycle(fine(0.060));
+  EXPECT_EQ(out.state, TorqueState::kOff);
+  EXPECT_NEAR(out.stop_time, 0.056, 1e-9);
+  EXPECT_FALSE(out.overrun);
+  logic.cycle(fine(0.061));
+  EXPECT_TRUE(logic.cycle(fine(0.062, true)).torque);
+}
+
+TEST(SafetyLogic, AnArmThatMovesAgainUnderItsBrakesIsLocked) {
+  SafetyLogic logic = running();
+  SafetyInput input = fine(0.004);
+  input.distance_ok = false;
+  logic.cycle(input);
+  for (int i = 5; i < 400; ++i) logic.cycle(fine(0.001 * i));
+  EXPECT_FALSE(logic.output().overrun);
+  input = fine(0.400);
+  input.qd[0] = 0.02;
+  EXPECT_TRUE(logic.cycle(input).overrun);
+}
+
+TEST(SafetyLogic, AnUnknownJointStateIsNeitherMotionNorLongerThanItLasts) {
+  SafetyLogic logic = running();
+  SafetyInput lost = fine(0.004);
+  lost.finite = false;
+  lost.qd.setConstant(std::numeric_limits<double>::quiet_NaN());
+  for (int i = 4; i < 64; ++i) {
+    lost.time = 0.001 * i;
+    logic.cycle(lost);
+  }
+  EXPECT_NEAR(logic.output().stop_time, 0.059, 1e-9);
+  EXPECT_FALSE(logic.output().overrun);
+  logic.cycle(fine(0.064));
+  lost.time = 0.065;  // once more, now at rest
+  EXPECT_FALSE(logic.cycle(lost).overrun);
+  logic.cycle(fine(0.066));
+  EXPECT_TRUE(logic.cycle(fine(0.067, true)).torque);
+}
+
 /// 10^5 random sequences of inputs and resets, against a judge that knows only the rule.
 TEST(SafetyLogic, TorqueNeverReturnsByItself) {
   Random random(7);
@@ -128,7 +177,6 @@ TEST(SafetyLogic, TorqueNeverReturnsByItself) {
     SafetyLogic logic(limits(), {.stop_time = 0.02});
     bool torque = false, button = true;
     double time = 0.0;
-    JointVector qd_last = JointVector::Zero(2);
     const double bad = random.uniform(0.0, 0.15), press = random.uniform(0.0, 0.9);
     const auto chance = [&](double share) { return random.uniform(0.0, 1.0) < share; };
     for (int i = 0; i < 40; ++i) {
@@ -150,7 +198,9 @@ TEST(SafetyLogic, TorqueNeverReturnsByItself) {
         ASSERT_EQ(out.violated, 0U) << "the cause is still there";
         ASSERT_LE(input.qd.cwiseAbs().maxCoeff(), 0.01) << "the arm moves";
       }
-      if (out.violated != 0U) ASSERT_FALSE(out.torque);
+      if (out.violated != 0U) {
+        ASSERT_FALSE(out.torque);
+      }
       cuts += static_cast<long>(torque && !out.torque);
       torque = out.torque;
     }

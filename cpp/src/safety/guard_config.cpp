@@ -106,6 +106,9 @@ void add_pairs(const Robot& robot, const Separation& separation,
 std::vector<Contradiction> contradictions(const Robot& robot, const GuardConfig& config) {
   const Eigen::Index n = robot.n_q();
   require_joints(config.q_reference, n, "q_reference");
+  require((config.q_reference.array() >= robot.q_min().array()).all() &&
+              (config.q_reference.array() <= robot.q_max().array()).all(),
+          "q_reference", config.q_reference.transpose(), "within the joints' ranges [rad]");
   const JointVector qd_max = config.qd_max.size() > 0 ? config.qd_max : robot.qd_max();
   const JointVector qdd_max = config.qdd_max.size() > 0 ? config.qdd_max : robot.qdd_max();
   require_joints(qd_max, n, "qd_max");

@@ -94,23 +94,34 @@ void SafetyLogic::check(const SafetyInput& input) {
 
 void SafetyLogic::advance(const SafetyInput& input, bool pressed) {
   const bool rest = input.finite && input.qd.cwiseAbs().maxCoeff() <= timing_.rest_speed;
+  // A clock that stands still or jumps must not hide how long a stop takes.
+  since_cut_ += std::isfinite(input.time) ? std::max(timing_.period, input.time - time_seen_)
+                                          : timing_.period;
+  const bool in_time = since_cut_ <= timing_.stop_time + kTimeSlack;
   switch (output_.state) {
     case TorqueState::kOn:
       if (output_.violated == 0) break;
       output_.state = TorqueState::kStopping;
       output_.trip = found_;
-      output_.trip.time = cut_at_ = input.time;
-      output_.stop_time = 0.0;
+      output_.trip.time = input.time;
+      output_.stop_time = since_cut_ = 0.0;
       ++output_.trips;
       break;
     case TorqueState::kStopping:
-      // A clock that stands still or jumps must not hide how long a stop takes.
-      output_.stop_time += std::max(timing_.period, input.time - time_last_);
-      if (!(output_.stop_time <= timing_.stop_time + kTimeSlack)) output_.overrun = true;
+      output_.stop_time = since_cut_;
+      if (!in_time) output_.overrun = true;
       if (rest) output_.state = TorqueState::kOff;
       break;
     case TorqueState::kOff:
-      if (!rest && output_.trips > 0) output_.overrun = true;
+      if (input.finite && !rest && output_.trips > 0) {
+        // Weight moves an arm until its brakes have closed, also one that stood or turned round.
+        if (in_time) {
+          output_.state = TorqueState::kStopping;
+          output_.stop_time = since_cut_;
+        } else {
+          output_.overrun = true;
+        }
+      }
       if (pressed && rest && !first_ && output_.violated == 0 && !output_.overrun)
         output_.state = TorqueState::kOn;
       break;
@@ -126,6 +137,7 @@ const SafetyOutput& SafetyLogic::cycle(const SafetyInput& input) {
   output_.reset_refused = pressed && !output_.torque && !was_on;
   reset_last_ = input.reset;
   first_ = false;
+  if (std::isfinite(input.time)) time_seen_ = input.time;
   if (input.finite) {
     qd_last_ = input.qd;
     time_last_ = input.time;

@@ -99,10 +99,10 @@ def run_command(options: RunOptions, command: str) -> int:
             )
     scenario = load_scenario(options.scenario, overrides(options))
     if scenario.kind == "walkthrough":
-        if options.controller is not None:
+        if options.controller:
             raise ConfigError(
-                f'--controller: {scenario.name} has kind = "walkthrough", where a hand guides the '
-                "arm: it has no controllers to choose from"
+                f"--controller {' '.join(options.controller)}: {options.scenario} has kind = "
+                '"walkthrough", where a hand guides the arm: there is none to choose'
             )
         return _run_walkthrough(scenario, options, command)
     controllers = tuple(dict.fromkeys(options.controller or scenario.controllers()))

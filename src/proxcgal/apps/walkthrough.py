@@ -123,6 +123,8 @@ def lines_of(summary: dict[str, Any]) -> list[str]:
             f"by the hand-guiding rules the same path takes {slow['teaching_time_s']:.1f} s to "
             f"teach (tool up to {slow['max_tcp_speed_mps']:.3f} m/s, {slow['trips']} trips)"
         )
+        found += _unfinished("by the hand-guiding rules", slow)
+    found += _unfinished("at the process's speed", summary)
     if summary["stops"]:
         head = ("stop", "brakes", "time", "distance")
         rows = [
@@ -135,3 +137,13 @@ def lines_of(summary: dict[str, Any]) -> list[str]:
         ]  # fmt: skip
         found.append(aligned([head, ("", "[%]", "[s]", "[m]"), *rows], left=1, heads=2))
     return found
+
+
+def _unfinished(how: str, taught: dict[str, Any]) -> list[str]:
+    """Says where a teaching without a trip did not come to its path's end."""
+    from proxcgal.sim.walk.teach import REACHED
+
+    left = taught.get("left_m")
+    if left is None or left <= REACHED:
+        return []
+    return [f"{how} the hand let go {left:.3f} m from the path's end: times do not compare"]

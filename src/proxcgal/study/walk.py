@@ -233,7 +233,8 @@ def figures(table: pl.DataFrame) -> dict[str, Figure]:
             fontsize=9,
             color=GREY,
         )
-        ax.set_xlim(0.0, 1.15 * bound)
+        most = done[column].drop_nulls().max()  # what is over the bound must be seen
+        ax.set_xlim(0.0, max(1.15 * bound, 1.05 * float(most or 0.0)))  # type: ignore[arg-type]
         ax.set_xlabel(label, fontsize=10)
         ax.tick_params(labelsize=9)
         ax.spines[["top", "right"]].set_visible(False)

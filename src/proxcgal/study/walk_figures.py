@@ -42,6 +42,10 @@ def trip_figure(log: WalkLog, *, title: str, window: Sequence[float] | None = No
         rows.insert(0, (log.distance, log.distance_limit, "distance [m]", True))
     elif trip.function == "relative_velocity":
         rows.insert(0, (log.velocity, log.velocity_limit, "relative velocity [m/s]", True))
+    elif trip.function == "joint_speed":
+        rows.insert(0, (log.speed_ratio, 1.0, "joint speed, of its bound [-]", True))
+    elif trip.function == "joint_acceleration":
+        rows.insert(0, (log.acceleration_ratio, 1.0, "joint accel., of its bound [-]", True))
     inside = (trip.time_s - _BEFORE, trip.time_s + _AFTER) if window is None else window
     figure = Figure(figsize=(8.4, 1.0 + 2.3 * len(rows)), dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)

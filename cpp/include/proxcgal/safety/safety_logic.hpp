@@ -107,10 +107,11 @@ class SafetyLogic {
   SafetyOutput output_;
   Trip found_;  ///< first violation of this cycle
   JointVector qd_last_;
-  double time_last_ = 0.0;
+  double time_last_ = 0.0;  ///< [s] of `qd_last_`
+  double time_seen_ = 0.0;  ///< [s] of the last cycle, whatever its joint state
   bool first_ = true;       ///< no cycle before this one
   bool reset_last_ = true;  ///< a button that is down at the start counts for nothing
-  double cut_at_ = 0.0;
+  double since_cut_ = 0.0;  ///< [s]
 };
 
 }  // namespace proxcgal

@@ -55,6 +55,7 @@ class WalkLog:
     trips: list[Trip] = field(default_factory=list)
     overrun: bool = False
     cycles: int = 0
+    left_m: float | None = None  #: of the tool from where the wished path ends; None after a trip
 
     @classmethod
     def empty(cls, cycles: int, joints: int, period: float, keys: Guard) -> WalkLog:
@@ -172,6 +173,7 @@ class WalkLog:
             "stop_time_s": stop if stop is None or np.isfinite(stop) else None,
             "stop_distance_m": self.stop_distance_m(),
             "max_tcp_speed_mps": self.max_tcp_speed(),
+            "left_m": self.left_m,
         }
 
 

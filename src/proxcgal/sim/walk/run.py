@@ -15,7 +15,7 @@ from proxcgal.sim.walk.poses import PoseRecorder, read_poses
 from proxcgal.sim.walk.setup import PERIOD, WalkSetup
 from proxcgal.sim.walk.stops import Stop, stops_of, worst_stops
 from proxcgal.sim.walk.taught import TaughtPath, clean
-from proxcgal.sim.walk.teach import START_AT, teach
+from proxcgal.sim.walk.teach import START_AT, check_duration, teach
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class WalkResult:
         found["teaching_time_s"] = None if self.path is None else self.path.duration
         found["hand_guiding"] = None if self.slow is None else {
             "teaching_time_s": _duration(self.slow), "trips": len(self.slow.trips),
-            "max_tcp_speed_mps": self.slow.max_tcp_speed(),
+            "max_tcp_speed_mps": self.slow.max_tcp_speed(), "left_m": self.slow.left_m,
         }  # fmt: skip
         found["latency_cycles"] = self.log.latency_cycles()
         found["false_trip"], found["missed"] = self.log.false_trip(), self.log.missed()
@@ -75,6 +75,7 @@ def run_walk(
         ConfigError: what does not fit, or a recording that cannot be written.
         SimulationError: MuJoCo warned.
     """
+    check_duration(setup.scenario)
     about = {"scenario": setup.scenario.to_toml(), "seed": str(seed)}
     with PoseRecorder(recording, about) as recorder:
         log = teach(setup, seed=seed, recorder=recorder, with_truth=True, on_progress=on_progress)

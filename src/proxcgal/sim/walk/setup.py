@@ -55,6 +55,7 @@ class WalkSetup:
         setup = cls(scenario, robot, arm, q0)
         setup.make_guard()
         setup.make_guide()
+        setup.make_physics()  # what it lacks is told before anything is written
         return setup
 
     def make_guard(self) -> _core.Guard:

@@ -48,7 +48,12 @@ def stops_of(setup: WalkSetup, seed: int) -> list[Stop]:
 
 
 def worst_stops(setup: WalkSetup) -> list[Stop]:
-    """Stretched level, 5 kg more on the gun, 1.30 m/s downwards, with the same brakes."""
+    """Stretched level, 5 kg more on the gun, 1.30 m/s downwards, with the same brakes.
+
+    None for an arm of another number of joints: the posture is that of `ga_ol`.
+    """
+    if setup.robot.n_q != len(STRETCHED):
+        return []
     return [_worst(setup, scale) for scale in BRAKE_SCALES]
 
 

@@ -6,7 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from proxcgal.errors import ConfigError
 from proxcgal.sim.walk.hand import Hand
+from proxcgal.sim.walk.keys import WalkScenario
 from proxcgal.sim.walk.log import WalkLog
 from proxcgal.sim.walk.poses import PoseRecorder
 from proxcgal.sim.walk.setup import PERIOD, WalkSetup
@@ -15,7 +17,23 @@ from proxcgal.sim.walk.wish import Wish
 RESET_AT, ENGAGE_AT, START_AT = 0.05, 0.10, 0.50  # [s] the button, the switch, the signal to start
 SETTLE = 0.8  # [s] after the path's end until the hand lets go
 AFTER_STOP = 0.6  # [s] that a stop is watched
-REACHED = 0.02  # [m] from where the path ends
+REACHED = 0.02  # [m] of the tool from where the path ends: farther, it was not taught to its end
+
+
+def check_duration(scenario: WalkScenario) -> None:
+    """Is there time for the wished path, also under the hand-guiding rules?
+
+    Raises:
+        ConfigError: it takes longer than `duration`.
+    """
+    for legs, rules in ((scenario.legs, ""), (scenario.slow().legs, " by the hand-guiding rules")):
+        path = PERIOD * len(Wish.of(legs, PERIOD))
+        needed = START_AT + path + scenario.hand.reaction_time + 2.0 * SETTLE
+        if scenario.duration < needed:
+            raise ConfigError(
+                f"scenario {scenario.name}: duration = {scenario.duration:g} s: the wished path "
+                f"takes {needed:.1f} s to teach{rules}"
+            )
 
 
 def teach(
@@ -80,4 +98,6 @@ def teach(
             break
     if on_progress is not None:
         on_progress(1.0)
+    if not log.trips:
+        log.left_m = float(np.linalg.norm(start[:3, 3] + wish.position[-1] - physics.tool_W))
     return log.cut()
