@@ -213,9 +213,9 @@ void closest_pairs(const Robot& robot, const Posture& posture, const PointsRef& 
 }
 
 SignedDistance signed_distance(const Robot& robot, const Posture& posture, const Vector3& point_W) {
-  constexpr double kAround = 0.5;     // of once round
-  constexpr double kTouching = 1e-9;  // [m] nearer than this the direction to the surface is noise
-  constexpr double kStep = 1e-6;      // [m] off the surface, to see which side is out
+  constexpr double around = 0.5;     // of once round
+  constexpr double touching = 1e-9;  // [m] nearer than this the direction to the surface is noise
+  constexpr double step = 1e-6;      // [m] off the surface, to see which side is out
   SignedDistance best;
   for (int link = 0; link < robot.n_links(); ++link) {
     const MeshTree& tree = robot.tree(link);
@@ -224,7 +224,7 @@ SignedDistance signed_distance(const Robot& robot, const Posture& posture, const
     const Bounds& box = tree.bounds();
     const bool within =
         (point_L.array() >= box.low.array() && point_L.array() <= box.high.array()).all();
-    const bool inside = within && std::abs(tree.winding_number(point_L)) > kAround;
+    const bool inside = within && std::abs(tree.winding_number(point_L)) > around;
     if (!inside && best.distance <= 0.0) continue;
     const auto found = tree.nearest(point_L, inside ? kInfinity : best.distance * best.distance);
     if (!found) continue;
@@ -232,14 +232,14 @@ SignedDistance signed_distance(const Robot& robot, const Posture& posture, const
     const double distance = inside ? -length : length;
     if (!(distance < best.distance)) continue;
     Vector3 normal_L = (point_L - found->point_L) / (inside ? -length : length);
-    if (length < kTouching) {
+    if (length < touching) {
       // On the surface: its own normal there, towards where it goes round less.
       const auto corner = [&](int k) {
         return Vector3(tree.vertices_L().row(tree.triangles()(found->triangle, k)).transpose());
       };
       normal_L = (corner(1) - corner(0)).cross(corner(2) - corner(0)).normalized();
-      const double ahead = std::abs(tree.winding_number(found->point_L + kStep * normal_L));
-      const double behind = std::abs(tree.winding_number(found->point_L - kStep * normal_L));
+      const double ahead = std::abs(tree.winding_number(found->point_L + step * normal_L));
+      const double behind = std::abs(tree.winding_number(found->point_L - step * normal_L));
       if (ahead > behind) normal_L = -normal_L;
     }
     best = {distance, link, T_WL * found->point_L, T_WL.linear() * normal_L};
