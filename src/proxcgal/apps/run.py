@@ -102,7 +102,7 @@ def run_command(options: RunOptions, command: str) -> int:
         if options.controller:
             raise ConfigError(
                 f"--controller {' '.join(options.controller)}: {options.scenario} has kind = "
-                '"walkthrough", where a hand guides the arm: there is none to choose'
+                '"walkthrough", where a hand guides the arm: no controllers to choose from'
             )
         return _run_walkthrough(scenario, options, command)
     controllers = tuple(dict.fromkeys(options.controller or scenario.controllers()))
