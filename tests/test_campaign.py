@@ -349,7 +349,10 @@ def test_names_of_trials_lead_nowhere(planned: Campaign) -> None:
         (["--set", "seed=3"], ["--set seed=...: every draw has its own; --seed fixes them all"]),
         (["--set", "obstacle=[]"], ["scenario front_plane: scenes can be drawn round one with "]),
         (["--set", "duration=-1"], ["front_plane.toml: override duration = -1: must be greater "]),
-        (["--scenario", "nowhere"], ["scenario 'nowhere': No such file or directory; a path to "]),
+        (
+            ["--scenario", "nowhere"],
+            ["scenario 'nowhere': no built-in scenario has that name, and no file; a path to "],
+        ),
         (
             ["--scenario", "front_plane", "front_plane"],
             ["--scenario front_plane: there is another one named front_plane"],

@@ -46,7 +46,9 @@ SHARED_STAGES = {
 }
 
 PYTHON_LAYERS = ("base", "models", "sim", "study", "apps")
-PYTHON_LAYER_OF = {"_core": "base", "errors": "base"} | {name: name for name in PYTHON_LAYERS[1:]}
+PYTHON_LAYER_OF = {"_core": "base", "errors": "base", "closing": "base"} | {
+    name: name for name in PYTHON_LAYERS[1:]
+}
 # World casts rays and draws; physics steps an arm with weight and brakes.
 ONLY_IN = {"mujoco": [("sim", "world"), ("sim", "physics")], "viser": [("apps", "view")]}
 

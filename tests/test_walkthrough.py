@@ -27,6 +27,7 @@ from proxcgal.sim.physics import Physics
 from proxcgal.sim.scenario import load_scenario, parse_scenario
 from proxcgal.sim.scenario_problems import models_in
 from proxcgal.sim.trial import run_trial
+from proxcgal.sim.walk import playback
 from proxcgal.sim.walk.guided import off_path
 from proxcgal.sim.walk.keys import GuidedScenario, Leg, WalkScenario
 from proxcgal.sim.walk.log import WalkLog
@@ -138,6 +139,19 @@ def test_playback_refuses_to_begin_elsewhere(short: WalkSetup, path: TaughtPath)
     with pytest.raises(ConfigError, match=r"mm from the path's start; playback.start_tolerance"):
         check_start(short.robot, q, path, 0.005)
     check_start(short.robot, path.q[0], path, 0.005)
+
+
+def test_a_playback_that_trips_on_its_way_to_the_start_tells_what_tripped(
+    path: TaughtPath, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    short = setup_of("walkthrough_teach", *SHORT, "playback.approach_speed=10.0")
+    monkeypatch.setattr(playback, "_APPROACH_SHARE", 4.0)
+    q = path.q[0] + np.array([0.0, 0.0, 0.0, 1.5, 0.0, 0.0])
+    played = play(short, path, q)
+    assert played.log.trips[0].function in {"joint_speed", "joint_acceleration"}
+    assert not played.log.torque[-1]
+    told = lines_of(WalkResult(teach(short, seed=0), path, played).summary())
+    assert any("played back up to" in line and "joint_" in line for line in told)
 
 
 @pytest.mark.parametrize("tolerance", [0.0005, 0.002])
@@ -359,6 +373,7 @@ def test_a_run_writes_what_the_experiment_asks_for(call: Callable[..., Any]) -> 
             "max_tcp_speed_mps"}  # fmt: skip
     assert keys <= summary.keys()
     assert summary["trips"][0].keys() >= {"time_s", "function", "value", "limit"}
+    assert summary["peak_after_cut_mps"] >= summary["trips"][0]["value"]
     assert {s["brake_scale"] for s in summary["stops"]} == {0.7, 1.0, 1.3}
     files = {path.name for path in folder.iterdir()}
     assert files >= {"walkthrough.png", "taught.mcap", "scenario.toml", "run.json", "report.html"}

@@ -13,13 +13,13 @@ from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import TracebackType
-from typing import Literal, Self
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from proxcgal import _core
+from proxcgal.closing import Closing
 from proxcgal.errors import ConfigError, ProxError
 from proxcgal.models import Robot
 from proxcgal.sim import frames
@@ -90,7 +90,7 @@ class _Active:
     cancelled: float = math.inf  # [s] when
 
 
-class JointRobotServer:
+class JointRobotServer(Closing):
     """Takes goals one after another; every goal that it takes ends exactly once.
 
     Without `start` nothing moves by itself: each `step` is one tick. With it a thread makes them in
@@ -281,19 +281,6 @@ class JointRobotServer:
         with self._lock:
             if self._active is not None:
                 self._end("cancelled", "the server was closed")
-
-    def __enter__(self) -> Self:
-        """Itself."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Closes."""
-        self.close()
 
     def _spin(self) -> None:
         due = clock.monotonic()

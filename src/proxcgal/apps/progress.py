@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
+
+from proxcgal.closing import Closing
 
 
-class Progress:
+class Progress(Closing):
     """Share of several pieces of work done, on stderr.
 
     A bar on a terminal; in a log (CI) a line per finished piece; nothing when quiet.
@@ -34,16 +35,7 @@ class Progress:
                 total=sum(sizes), desc=title, unit=unit, bar_format=shape, dynamic_ncols=True
             )
 
-    def __enter__(self) -> Self:
-        """Itself."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
         """Leaves the bar as it stands."""
         if self._bar is not None:
             self._bar.close()

@@ -96,15 +96,14 @@ def lines_of(summary: dict[str, Any]) -> list[str]:
     found = []
     for trip in summary["trips"]:
         found.append(
-            f"{trip['time_s']:.3f} s: {trip['function']} {trip['value']:.3f}, allowed "
-            f"{trip['limit']:.3f}: torque off, {summary['latency_cycles']} cycles after the first "
-            "true violation"
+            f"{_cut(trip)}, {summary['latency_cycles']} cycles after the first true violation"
         )
     if summary["trips"]:
         stop = summary["stop_time_s"]
         found.append(
             "the arm did not come to rest while it was watched" if stop is None else
-            f"at rest after {stop:.3f} s and {summary['stop_distance_m']:.3f} m of the tool; "
+            f"at rest after {stop:.3f} s and {summary['stop_distance_m']:.3f} m of the tool, which "
+            f"came to {summary['peak_after_cut_mps']:.2f} m/s before the brakes held it; "
             f"minimum distance {summary['min_distance_m']:.3f} m, ISO/TS 15066 "
             f"{summary['iso_distance_m']:.2f} m"
         )  # fmt: skip
@@ -114,10 +113,13 @@ def lines_of(summary: dict[str, Any]) -> list[str]:
         error = summary["playback_error_m"]
         found.append(
             f"taught in {summary['teaching_time_s']:.1f} s, cleaned by at most "
-            f"{1000 * played['cleaned_by_m']:.2f} mm, played back in {played['time_s']:.1f} s "
-            f"within {1000 * error['max']:.2f} mm ({1000 * error['rms']:.2f} mm rms), "
-            f"{played['trips']} trips"
-        )
+            f"{1000 * played['cleaned_by_m']:.2f} mm, "
+            + (
+                f"played back up to {_cut(played['trips'][0])}" if played["trips"] else
+                f"played back in {played['time_s']:.1f} s within {1000 * error['max']:.2f} mm "
+                f"({1000 * error['rms']:.2f} mm rms), no trip"
+            )
+        )  # fmt: skip
     if slow := summary["hand_guiding"]:
         found.append(
             f"by the hand-guiding rules the same path takes {slow['teaching_time_s']:.1f} s to "
@@ -137,6 +139,14 @@ def lines_of(summary: dict[str, Any]) -> list[str]:
         ]  # fmt: skip
         found.append(aligned([head, ("", "[%]", "[s]", "[m]"), *rows], left=1, heads=2))
     return found
+
+
+def _cut(trip: dict[str, Any]) -> str:
+    """When and why the guard cut the torque."""
+    return (
+        f"{trip['time_s']:.3f} s: {trip['function']} {trip['value']:.3f}, allowed "
+        f"{trip['limit']:.3f}: torque off"
+    )
 
 
 def _unfinished(how: str, taught: dict[str, Any]) -> list[str]:

@@ -13,13 +13,13 @@ import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import TracebackType
-from typing import IO, BinaryIO, Literal, Self, cast
+from typing import IO, BinaryIO, Literal, cast
 
 import numpy as np
 from mcap.writer import CompressionType, IndexType, Writer
 from numpy.typing import NDArray
 
+from proxcgal.closing import Closing
 from proxcgal.errors import ConfigError
 from proxcgal.sim import foxglove, packing
 from proxcgal.sim.scenario import Scenario
@@ -55,7 +55,7 @@ class Settings:
     ticks: RecordedTicks = "all"
 
 
-class Recorder:
+class Recorder(Closing):
     """Writes one run. A full disk stops the recording, with a warning, but never the run."""
 
     def __init__(self, path: str | Path, ticks: RecordedTicks = "all") -> None:
@@ -139,19 +139,6 @@ class Recorder:
             self._fail(error)
         if not self.started:
             self.path.unlink(missing_ok=True)
-
-    def __enter__(self) -> Self:
-        """Closes it at the end."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Closes the file, whatever happened."""
-        self.close()
 
     def _start(self, settings: Settings) -> None:
         self._writer.start(PROFILE, f"proxcgal {settings.versions.get('proxcgal', '')}")

@@ -188,6 +188,8 @@ def load_scenario(name_or_path: str | Path, overrides: Sequence[str] = ()) -> Sc
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "not a text file"
+        if isinstance(error, FileNotFoundError):
+            reason = "no built-in scenario has that name, and no file"
         raise ConfigError(
             f"scenario {str(name_or_path)!r}: {reason}; a path to a TOML file or one of: "
             f"{', '.join(sorted(built_in))}"

@@ -18,9 +18,9 @@ from concurrent.futures import (
 )
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
+from proxcgal.closing import Closing
 from proxcgal.errors import SimulationError
 from proxcgal.study.cluster import Cluster, work_far
 from proxcgal.study.jobs import Job, Progress, end_with, interrupts_blocked, work
@@ -28,7 +28,7 @@ from proxcgal.study.jobs import Job, Progress, end_with, interrupts_blocked, wor
 POLL_S = 0.1  # [s] between looks at the progress
 
 
-class Pool:
+class Pool(Closing):
     """Runs jobs on worker processes, on a cluster, or here when one worker is enough.
 
     Ctrl-C reaches this process only: workers have it blocked, are told through the progress file,
@@ -48,16 +48,7 @@ class Pool:
         self._workers = [_Worker() for _ in range(workers)]
         self._cluster = None if cluster is None else Cluster(cluster)
 
-    def __enter__(self) -> Self:
-        """The pool itself."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
         """Waits for the workers to end; those of a cluster go on without us."""
         for worker in self._workers:
             worker.close()

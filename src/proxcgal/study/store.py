@@ -9,9 +9,9 @@ import os
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
+from proxcgal.closing import Closing
 from proxcgal.errors import ConfigError
 from proxcgal.study.analysis import write_json
 
@@ -32,7 +32,7 @@ class Outcome:
     wall_s: float = 0.0  # [s] what it took; says nothing of the trial itself
 
 
-class Store:
+class Store(Closing):
     """The trials of one campaign that came to an end, one file each.
 
     A file is written beside, brought to the disk and moved into place before `put` returns: what
@@ -73,16 +73,7 @@ class Store:
         if not (folder / MANIFEST).is_file():
             write_json(folder / MANIFEST, description)
 
-    def __enter__(self) -> Self:
-        """The store itself."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
         """Lets other processes in; a killed process does so too."""
         os.close(self._lock)
 

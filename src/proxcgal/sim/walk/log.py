@@ -133,6 +133,10 @@ class WalkLog:
         """While the torque was on [m/s]."""
         return float(self.tcp_speed[self.torque].max(initial=0.0))
 
+    def peak_after_cut(self) -> float | None:
+        """Of the tool once the torque is cut: it may speed up before the brakes hold [m/s]."""
+        return float(self.tcp_speed[self.trips[0].cycle :].max()) if self.trips else None
+
     def truly_violated(self) -> NDArray[np.bool_]:
         """(n,) cycles under torque in which the simulator itself finds a bound violated.
 
@@ -162,14 +166,19 @@ class WalkLog:
         """Something is truly violated and nothing trips."""
         return not self.trips and bool(self.truly_violated().any())
 
+    def told_trips(self) -> list[dict[str, Any]]:
+        """Each trip's time, function, value and limit."""
+        return [
+            {"time_s": t.time_s, "function": t.function, "value": t.value, "limit": t.limit}
+            for t in self.trips
+        ]
+
     def summary(self) -> dict[str, Any]:
         """What experiments report."""
         stop = self.stop_time_s()
         return {
-            "trips": [
-                {"time_s": t.time_s, "function": t.function, "value": t.value, "limit": t.limit}
-                for t in self.trips
-            ],
+            "trips": self.told_trips(),
+            "peak_after_cut_mps": self.peak_after_cut(),
             "stop_time_s": stop if stop is None or np.isfinite(stop) else None,
             "stop_distance_m": self.stop_distance_m(),
             "max_tcp_speed_mps": self.max_tcp_speed(),

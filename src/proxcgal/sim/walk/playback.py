@@ -63,7 +63,7 @@ def play(setup: WalkSetup, path: TaughtPath, q: Array | None = None) -> Played:
         human = physics.human_velocity() if setup.scenario.guard.subtract_human else None
         out = guard.cycle(time, physics.q, physics.qd, time >= _RESET_AT, human)
         log.add(time, physics, out, None, None, bounds)
-        if k == start:
+        if k == start and not log.trips:
             check_start(setup.robot, physics.q, path, keys.start_tolerance)
         command = still
         if not out.torque:

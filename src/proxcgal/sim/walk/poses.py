@@ -12,8 +12,6 @@ import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 from mcap.exceptions import McapError
@@ -22,6 +20,7 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, IndexType, Writer
 from numpy.typing import NDArray
 
+from proxcgal.closing import Closing
 from proxcgal.errors import ConfigError, RecordingError
 from proxcgal.sim.foxglove import nanoseconds
 from proxcgal.sim.versions import versions
@@ -38,7 +37,7 @@ _SCHEMA = {
 }
 
 
-class PoseRecorder:
+class PoseRecorder(Closing):
     """Writes one teaching. A full disk stops the recording, with a warning, but never the run."""
 
     def __init__(self, path: str | Path, about: Mapping[str, str]) -> None:
@@ -102,19 +101,6 @@ class PoseRecorder:
             self._stream.close()
         except OSError as error:
             self._fail(error)
-
-    def __enter__(self) -> Self:
-        """Closes it at the end."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Closes the file, whatever happened."""
-        self.close()
 
     def _fail(self, error: OSError) -> None:
         if self.failure is not None:

@@ -38,7 +38,7 @@ class WalkResult:
         }
         found["playback"] = None if played is None or self.path is None else {
             "scale": played.scale, "time_s": played.time_s,
-            "cleaned_by_m": self.path.deviation_m, "trips": len(played.log.trips),
+            "cleaned_by_m": self.path.deviation_m, "trips": played.log.told_trips(),
         }  # fmt: skip
         found["teaching_time_s"] = None if self.path is None else self.path.duration
         found["hand_guiding"] = None if self.slow is None else {
