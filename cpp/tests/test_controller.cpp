@@ -259,20 +259,24 @@ TEST(Controller, SilenceOfOneArrayHoldsTheArmWithin200Milliseconds) {
 
 TEST(Controller, TheSamePayloadAgainAndAgainIsSuspect) {
   const auto robot = test::arm();
-  Controller controller(robot, test::ring(), ControllerConfig{});
   Random random(22);
   const JointVector q = bent();
   const Pose goal = goal_near(*robot, q);
   const auto stuck = scans(random, 10, 0, 0.0, 1.0);
-  for (int i = 0; i < 20; ++i) {
-    auto batch = scans(random, 10, static_cast<std::uint32_t>(i), 0.01 * i, 1.0);
-    batch[3].ranges = stuck[3].ranges;
-    const Mode mode = controller.tick(0.01 * i, q, batch, goal).mode;
-    EXPECT_EQ(found(controller, Reason::kSensorSuspect), i >= 5);
-    if (i < 5) {
-      EXPECT_EQ(mode, Mode::kRun);
-    } else {
-      EXPECT_GE(mode, Mode::kDegraded);
+  // A wall beyond the workspace is no point of the cloud, but it is told all the same.
+  for (const double farther : {0.0, 2.0}) {
+    Controller controller(robot, test::ring(), ControllerConfig{});
+    for (int i = 0; i < 20; ++i) {
+      auto batch = scans(random, 10, static_cast<std::uint32_t>(i), 0.01 * i, 1.0);
+      batch[3].ranges = stuck[3].ranges;
+      for (double& range : batch[3].ranges) range += farther;
+      const Mode mode = controller.tick(0.01 * i, q, batch, goal).mode;
+      EXPECT_EQ(found(controller, Reason::kSensorSuspect), i >= 5);
+      if (i < 5) {
+        EXPECT_EQ(mode, Mode::kRun);
+      } else {
+        EXPECT_GE(mode, Mode::kDegraded);
+      }
     }
   }
 }
