@@ -93,8 +93,8 @@ SHOWN: tuple[Shown, ...] = (
           ((_CONTROLLER, "AnObstacleThatTouchesIsNotTakenForBody"),
            (_CONTROLLER, "FromContactAndFromInsideEveryCommandLeadsOut"),
            (_CONTROLLER, "InsideTheLeastDistanceNothingComesNearer"))),
-    Shown("a stuck payload", "suspect however far it sees; what it shows inside d_min ends with its "
-          "fault, what is remembered from before stays, and it clears nothing",
+    Shown("a stuck payload", "suspect however far it sees; what it shows inside d_min ends with "
+          "its fault, what is remembered from before stays, and it clears nothing",
           ((_CONTROLLER, "TheSamePayloadAgainAndAgainIsSuspect"),
            (_MISBEHAVIOUR, "AStuckPayloadDoesNotOutliveItsFaultAsAContact"),
            (_MEMORY, "AStuckPayloadClearsNothingAndIsNotRememberedOnceItEnds"),
