@@ -9,11 +9,13 @@ import pytest
 import proxcgal as px
 from proxcgal import _core
 from proxcgal.sim.faults import FaultInjector
+from proxcgal.sim.recording import Recorder
 from proxcgal.sim.scenario import load_scenario
 from proxcgal.sim.scenario_keys import Fault
 from proxcgal.sim.ticks import TickInput
+from proxcgal.sim.trial import run_trial
 from proxcgal.study.campaign import Trial
-from proxcgal.study.fault_rows import DEGRADED, HOLD, ROWS, RUN
+from proxcgal.study.fault_rows import DEGRADED, HOLD, ROWS, RUN, STOP
 from proxcgal.study.faults import KIND, perform, plan
 from proxcgal.study.kind import Wishes
 from proxcgal.study.reliability import GOALS
@@ -118,6 +120,15 @@ def test_swapped_scans_come_in_pairs_the_later_first() -> None:
 
 def test_a_joint_state_that_is_not_a_number_is_all_of_it() -> None:
     assert all(np.isnan(given.q).all() for given in through("joints_nan", 3))
+
+
+def test_a_run_whose_joint_state_is_never_a_number_is_recorded_to_its_end(tmp_path: Path) -> None:
+    overrides = ('fault=[{kind = "joints_nan"}]', "duration=0.1", "vertices_per_link=500")
+    scenario = load_scenario("front_plane", overrides)
+    with Recorder(tmp_path / "nan.mcap") as recorder:
+        log = run_trial(scenario, "wb", recorder=recorder)
+    assert (log.mode == STOP).all()
+    assert log.recording_failure is None
 
 
 ROOT = Path(__file__).parents[1]

@@ -98,8 +98,9 @@ ControlPair Caution::control(const TickOutput& out, const Vector3& velocity_W) c
 
 void Caution::watch(double time, const TickOutput& out, Perception& perception) {
   // A payload that is stuck is no obstacle that was seen there: it must not outlive its fault.
+  // What is remembered was seen before.
   const bool doubtful =
-      out.pair && out.pair_origin.sensor >= 0 &&
+      out.pair && !out.pair_remembered && out.pair_origin.sensor >= 0 &&
       perception.freshness().suspect(static_cast<std::size_t>(out.pair_origin.sensor));
   if (!inside(out) || doubtful) near_since_ = time;
   const bool believed = time - near_since_ > kBelieved;

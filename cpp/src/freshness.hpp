@@ -16,7 +16,7 @@ class Freshness {
   /// @param time   internal clock [s]
   /// @param delay  internal time minus the caller's
   bool accept(double time, double delay, const Scan& scan, Monitor& monitor);
-  /// An accepted packet. @param targets  zones that saw something
+  /// An accepted packet. @param targets  zones that saw something, however far
   void note(double time, const Scan& scan, int targets, bool usable);
   /// Tells silent and suspect sensors, silent arrays and a silent skin.
   void check(double time, Monitor& monitor) const;

@@ -99,7 +99,7 @@ void Perception::stage(double time, const Scan& scan, double stamp, Monitor& mon
   }
   // A scan without one usable zone tells nothing: the sensor's last cloud stays, and its age grows.
   const bool usable = sensed.invalid < kZones;
-  freshness_.note(time, scan, sensed.count, usable);
+  freshness_.note(time, scan, sensed.targets, usable);
   if (!usable) return;
   const Eigen::Index before = staged_.count;
   const Pose T_WS = posture_.T_WL[static_cast<std::size_t>(sensor.link)] * sensor.T_LS;

@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <memory>
 
 #include "meshes.hpp"
@@ -56,10 +57,40 @@ inline Skin ring(int sensors = 10, const std::string& link = "link3") {
   return skin;
 }
 
+/// One sensor that stands off the link that carries it, and looks back at it: the surface is at
+/// 0.25 m.
+inline Skin looking_back() {
+  Skin skin = ring(1);
+  Pose& T_LS = skin.mounts[0].T_LS;
+  T_LS.translation() = Vector3(0.31, 0.0, 0.15);
+  T_LS.linear().col(2) = -Vector3::UnitX();
+  T_LS.linear().col(1) = T_LS.linear().col(2).cross(Vector3(T_LS.linear().col(0)));
+  return skin;
+}
+
+/// A posture of that arm far from its limits and from singular ones.
+inline JointVector bent() {
+  JointVector q(6);
+  q << 0.2, 0.6, 0.9, 0.1, 0.5, 0.0;
+  return q;
+}
+
 inline JointVector posture(Random& random, int n) {
   JointVector q(n);
   for (int i = 0; i < n; ++i) q[i] = random.uniform(-2.0, 2.0);
   return q;
+}
+
+inline Pose tool_at(const Robot& robot, const JointVector& q) {
+  Posture posture = robot.make_posture();
+  robot.update(q, posture);
+  return posture.T_WT;
+}
+
+inline bool found(const Controller& controller, Reason reason) {
+  const auto findings = controller.findings();
+  return std::any_of(findings.begin(), findings.end(),
+                     [&](const Finding& finding) { return finding.reason == reason; });
 }
 
 inline Points cloud(Random& random, int n, double half) {

@@ -16,18 +16,12 @@
 namespace proxcgal {
 namespace {
 
+using test::bent;
+using test::found;
 using test::Random;
 
-JointVector bent() {
-  JointVector q(6);
-  q << 0.2, 0.6, 0.9, 0.1, 0.5, 0.0;
-  return q;
-}
-
 Pose goal_near(const Robot& robot, const JointVector& q) {
-  Posture posture = robot.make_posture();
-  robot.update(q, posture);
-  Pose goal = posture.T_WT;
+  Pose goal = test::tool_at(robot, q);
   goal.translation().x() += 0.2;
   return goal;
 }
@@ -87,8 +81,6 @@ TEST(Controller, TickAllocatesNothing) {
   }
 }
 
-#if defined(__linux__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-/// A child that may only read, write and exit: whoever else calls the system is killed.
 TEST(Controller, SelfCollisionPartsTheNearestLinksThatJointsCanPart) {
   const auto robot = test::arm();
   ControllerConfig config;
@@ -118,6 +110,8 @@ TEST(Controller, SelfCollisionPartsTheNearestLinksThatJointsCanPart) {
   EXPECT_GT(before, 0.0);
 }
 
+#if defined(__linux__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+/// A child that may only read, write and exit: whoever else calls the system is killed.
 TEST(Controller, TickMakesNoSystemCall) {
   const auto robot = test::arm();
   Controller controller(robot, test::ring(), five_tasks());
@@ -239,12 +233,6 @@ TEST(Controller, SilenceOfAllSensorsHoldsTheArmWithin200Milliseconds) {
   EXPECT_EQ(mode, Mode::kHold);
 }
 
-bool found(const Controller& controller, Reason reason) {
-  const auto findings = controller.findings();
-  return std::any_of(findings.begin(), findings.end(),
-                     [&](const Finding& finding) { return finding.reason == reason; });
-}
-
 TEST(Controller, SilenceOfOneArrayHoldsTheArmWithin200Milliseconds) {
   const auto robot = test::arm();
   Skin skin = test::ring(10);
@@ -271,20 +259,24 @@ TEST(Controller, SilenceOfOneArrayHoldsTheArmWithin200Milliseconds) {
 
 TEST(Controller, TheSamePayloadAgainAndAgainIsSuspect) {
   const auto robot = test::arm();
-  Controller controller(robot, test::ring(), ControllerConfig{});
   Random random(22);
   const JointVector q = bent();
   const Pose goal = goal_near(*robot, q);
   const auto stuck = scans(random, 10, 0, 0.0, 1.0);
-  for (int i = 0; i < 20; ++i) {
-    auto batch = scans(random, 10, static_cast<std::uint32_t>(i), 0.01 * i, 1.0);
-    batch[3].ranges = stuck[3].ranges;
-    const Mode mode = controller.tick(0.01 * i, q, batch, goal).mode;
-    EXPECT_EQ(found(controller, Reason::kSensorSuspect), i >= 5);
-    if (i < 5) {
-      EXPECT_EQ(mode, Mode::kRun);
-    } else {
-      EXPECT_GE(mode, Mode::kDegraded);
+  // A wall beyond the workspace is no point of the cloud, but it is told all the same.
+  for (const double farther : {0.0, 2.0}) {
+    Controller controller(robot, test::ring(), ControllerConfig{});
+    for (int i = 0; i < 20; ++i) {
+      auto batch = scans(random, 10, static_cast<std::uint32_t>(i), 0.01 * i, 1.0);
+      batch[3].ranges = stuck[3].ranges;
+      for (double& range : batch[3].ranges) range += farther;
+      const Mode mode = controller.tick(0.01 * i, q, batch, goal).mode;
+      EXPECT_EQ(found(controller, Reason::kSensorSuspect), i >= 5);
+      if (i < 5) {
+        EXPECT_EQ(mode, Mode::kRun);
+      } else {
+        EXPECT_GE(mode, Mode::kDegraded);
+      }
     }
   }
 }
@@ -365,17 +357,9 @@ TEST(Controller, InsideTheLeastDistanceNothingComesNearer) {
 
 TEST(Controller, AnObstacleThatTouchesIsNotTakenForBody) {
   const auto robot = test::arm();
-  Skin skin = test::ring(1);
-  // It stands off the link that carries it, and looks back at it: the surface is at 0.25 m.
-  Pose& T_LS = skin.mounts[0].T_LS;
-  T_LS.translation() = Vector3(0.31, 0.0, 0.15);
-  T_LS.linear().col(2) = -Vector3::UnitX();
-  T_LS.linear().col(1) = T_LS.linear().col(2).cross(Vector3(T_LS.linear().col(0)));
-  Controller controller(robot, skin, ControllerConfig{});
+  Controller controller(robot, test::looking_back(), ControllerConfig{});
   const JointVector q = bent();
-  Posture posture = robot->make_posture();
-  robot->update(q, posture);
-  const Pose goal = posture.T_WT;
+  const Pose goal = test::tool_at(*robot, q);
   int kept = 0;
   for (int i = 0; i < 60; ++i) {
     Scan scan;

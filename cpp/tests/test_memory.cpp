@@ -321,6 +321,46 @@ TEST_F(WithMemory, AStuckPayloadClearsNothingAndIsNotRememberedOnceItEnds) {
   EXPECT_EQ(remembered(), before);
 }
 
+TEST_F(WithMemory, WhatIsRememberedInsideTheLeastDistanceStaysThoughItsSensorIsStuckSince) {
+  Controller law(robot, test::ring(1), config());
+  constexpr int seen = 10, stuck = 20;
+  int doubted = 0;
+  for (int i = 0; i < stuck; ++i) {
+    // Something before the middle; then the upper half tells the same far wall again and again,
+    // and the rest nothing.
+    Scan scan{.sensor = 0, .counter = static_cast<std::uint32_t>(i), .stamp = 0.07 * i};
+    scan.ranges.fill(i < seen ? 0.12 + 1e-3 * (i % 3) : 0.9);
+    scan.status.fill(0);
+    const auto first = static_cast<std::size_t>(i < seen ? 26 : 0);
+    for (std::size_t zone = first; zone < first + 4; ++zone) scan.status[zone] = 5;
+    const TickOutput& out = law.tick(scan.stamp, q, std::span(&scan, 1), goal);
+    ASSERT_TRUE(out.pair);
+    EXPECT_EQ(out.pair_remembered, i >= seen) << i;
+    EXPECT_LT(out.trusted_distance, 0.2);
+    doubted += test::found(law, Reason::kSensorSuspect) ? 1 : 0;
+  }
+  EXPECT_GT(doubted, 3);
+  // The arm comes to it, nearer than what it takes for its own surface.
+  Posture posture = robot->make_posture();
+  const Points points = law.cloud_W().bottomRows(law.cloud_W().rows() - law.seen_points());
+  ClosestPair pair;
+  for (int step = 0; step < 20; ++step) {
+    robot->update(q, posture);
+    pair = closest_pair(*robot, posture, points, Method::kFast);
+    const ControlPair toward{.link = pair.link,
+                             .control_W = pair.surface_W,
+                             .obstacle_W = pair.obstacle_W,
+                             .distance = pair.distance};
+    const JointVector row = opening_row(*robot, posture, toward);
+    q -= 0.5 * (pair.distance - 0.01) / row.squaredNorm() * row;
+  }
+  ASSERT_NEAR(pair.distance, 0.01, 0.005);
+  const TickOutput& out = law.tick(0.07 * stuck, q, {}, goal);
+  ASSERT_TRUE(out.pair);
+  EXPECT_TRUE(out.pair_remembered);
+  EXPECT_NEAR(out.pair->distance, 0.01, 0.005);
+}
+
 TEST_F(WithMemory, WithoutItEverythingIsAsItWas) {
   ControllerConfig off;
   off.memory = MemoryConfig{.memory_s = 0.0};

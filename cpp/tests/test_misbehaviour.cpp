@@ -10,25 +10,10 @@
 namespace proxcgal {
 namespace {
 
+using test::bent;
+using test::found;
 using test::Random;
-
-JointVector bent() {
-  JointVector q(6);
-  q << 0.2, 0.6, 0.9, 0.1, 0.5, 0.0;
-  return q;
-}
-
-Pose tool_at(const Robot& robot, const JointVector& q) {
-  Posture posture = robot.make_posture();
-  robot.update(q, posture);
-  return posture.T_WT;
-}
-
-bool found(const Controller& controller, Reason reason) {
-  const auto findings = controller.findings();
-  return std::any_of(findings.begin(), findings.end(),
-                     [&](const Finding& finding) { return finding.reason == reason; });
-}
+using test::tool_at;
 
 std::vector<Scan> wall(int sensors, std::uint32_t counter, double stamp, double range) {
   std::vector<Scan> out;
@@ -223,13 +208,7 @@ TEST(Misbehaviour, AvoidanceThatIsNotExecutedInsideTheLeastDistanceHolds) {
 
 TEST(Misbehaviour, AStuckPayloadDoesNotOutliveItsFaultAsAContact) {
   const auto robot = test::arm();
-  Skin skin = test::ring(1);
-  // It stands off the link that carries it, and looks back at it: the surface is at 0.25 m.
-  Pose& T_LS = skin.mounts[0].T_LS;
-  T_LS.translation() = Vector3(0.31, 0.0, 0.15);
-  T_LS.linear().col(2) = -Vector3::UnitX();
-  T_LS.linear().col(1) = T_LS.linear().col(2).cross(Vector3(T_LS.linear().col(0)));
-  Controller controller(robot, skin, ControllerConfig{});
+  Controller controller(robot, test::looking_back(), ControllerConfig{});
   const JointVector q = bent();
   const Pose goal = tool_at(*robot, q);
   Scan scan;

@@ -72,6 +72,7 @@ Vector3 Sense::point(int zone, double range) const {
 
 void Sense::operator()(const Scan& scan, SensedPoints& out) const {
   out.count = 0;
+  out.targets = 0;
   out.invalid = 0;
   out.first_invalid_zone = -1;
   for (int zone = 0; zone < kZones; ++zone) {
@@ -81,6 +82,7 @@ void Sense::operator()(const Scan& scan, SensedPoints& out) const {
       if (out.invalid++ == 0) out.first_invalid_zone = zone;
     }
     if (state != ZoneState::kTarget && state != ZoneState::kUncertain) continue;
+    ++out.targets;
     const double ray_per_range = ray_per_range_[static_cast<std::size_t>(zone)];
     const double along_ray = range * ray_per_range;
     if (along_ray > model_.workspace) continue;

@@ -104,7 +104,7 @@ def run_trial(
         true = NOT_ASKED if truth is None else truth(source.q, len(ticks) * period)
         ticks.append(Tick(given, result, TickTruth(true.distance, true.link, true.own, leaked)))
         if log is not None:
-            log.write(ticks[-1], (len(ticks) - 1) * period, law)
+            log.write(ticks[-1], (len(ticks) - 1) * period, law, reached[-1])
         if on_progress is not None and len(ticks) % beat == 0:
             on_progress(min(len(ticks) * period / scenario.duration, 1.0))
         if watch is not None:
@@ -160,13 +160,14 @@ class _Log:
         self._hz = hz
         self._beats = -1
 
-    def write(self, tick: Tick, elapsed: float, law: _core.Controller) -> None:
+    def write(self, tick: Tick, elapsed: float, law: _core.Controller, q: Array) -> None:
+        """One tick; the arm is drawn at `q`, where it is, whatever the controller is told."""
         beats = int(np.floor(elapsed * self._hz + 1e-9))  # those of the scans
         beat = beats > self._beats
         if beat:
             self._beats = beats
             arrow = (tick.result.control_W, tick.result.obstacle_W)
-            poses = np.asarray(self._robot.link_poses(tick.given.q))
+            poses = np.asarray(self._robot.link_poses(q))
             names = self._robot.link_names
             if beats == 0 or not self._scene.still:
                 self._recorder.show_scene(tick.given.time, self._scene, elapsed)

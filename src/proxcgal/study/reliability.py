@@ -10,9 +10,12 @@ from proxcgal.study.fault_rows import RUN, Row
 _CONTROLLER = "cpp/tests/test_controller.cpp"
 _MISBEHAVIOUR = "cpp/tests/test_misbehaviour.cpp"
 _COMMAND = "cpp/tests/test_command.cpp"
+_MEMORY = "cpp/tests/test_memory.cpp"
 _MESH = "cpp/tests/test_mesh_tree.cpp"
 _PIPELINE = "cpp/tests/test_pipeline.cpp"
 _FUZZ = "cpp/tests/test_fuzz.cpp"
+_SERVER = "tests/test_joint_server.py"
+_SERVE = "tests/test_serve.py"
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,8 +93,13 @@ SHOWN: tuple[Shown, ...] = (
           ((_CONTROLLER, "AnObstacleThatTouchesIsNotTakenForBody"),
            (_CONTROLLER, "FromContactAndFromInsideEveryCommandLeadsOut"),
            (_CONTROLLER, "InsideTheLeastDistanceNothingComesNearer"))),
-    Shown("a stuck payload inside d_min", "ends with its fault",
-          ((_MISBEHAVIOUR, "AStuckPayloadDoesNotOutliveItsFaultAsAContact"),)),
+    Shown("a stuck payload", "suspect however far it sees; what it shows inside d_min ends with "
+          "its fault, what is remembered from before stays, and it clears nothing",
+          ((_CONTROLLER, "TheSamePayloadAgainAndAgainIsSuspect"),
+           (_MISBEHAVIOUR, "AStuckPayloadDoesNotOutliveItsFaultAsAContact"),
+           (_MEMORY, "AStuckPayloadClearsNothingAndIsNotRememberedOnceItEnds"),
+           (_MEMORY,
+            "WhatIsRememberedInsideTheLeastDistanceStaysThoughItsSensorIsStuckSince"))),
     Shown("closest point jumps between links", "acceleration limits hold; a switch at once only by "
           "10 mm or inside d_min, else one per 100 ms",
           ((_MISBEHAVIOUR, "CommandsStayContinuousWhereTheClosestPointJumps"),)),
@@ -121,6 +129,23 @@ SHOWN: tuple[Shown, ...] = (
            ("tests/test_gate.py", "test_a_flood_ends_its_connection_and_no_other"),
            ("tests/test_gate.py", "test_a_viewer_that_vanishes_leaves_nothing_behind"),
            ("tests/test_view.py", "test_nothing_that_a_page_says_leads_out_of_a_stop"))),
+    Shown("goal of the 12-joint server preempted, cancelled, held off, or two at once",
+          "exactly one end: succeeded, aborted or cancelled, with its reason",
+          ((_SERVER, "test_a_goal_is_reached_and_its_feedback_says_how_it_goes"),
+           (_SERVER, "test_a_goal_held_off_by_an_obstacle_is_aborted_with_what_holds_it"),
+           (_SERVER, "test_cancel_brakes_within_the_acceleration_limits"),
+           (_SERVER, "test_a_second_goal_preempts_or_is_refused_as_set"),
+           (_SERVER, "test_a_goal_ends_when_the_thread_that_makes_the_ticks_fails"),
+           (_SERVE, "test_a_goal_ends_when_its_client_is_gone"))),
+    Shown("hostile client of the 12-joint server", "loopback by default; sizes, counts and rates "
+          "bounded; nonsense is answered and moves nothing; no message leads out of a STOP",
+          ((_SERVE, "test_only_loopback_is_listened_on_unless_asked_for"),
+           (_SERVE, "test_nonsense_is_answered_and_moves_nothing"),
+           (_SERVE, "test_a_message_without_end_is_cut_off"),
+           (_SERVE, "test_a_flood_is_cut_off_and_the_others_go_on"),
+           (_SERVE, "test_clients_beyond_the_bound_are_turned_away"),
+           (_SERVER,
+            "test_a_stop_outlives_a_change_of_tasks_and_a_goal_that_waits_to_begin"))),
 )  # fmt: skip
 
 _LONG_CPP = "`./run test --long`"
@@ -229,9 +254,8 @@ that is 4 or 5 of 30 sensors. An offset of a sensor's ranges counts as a shift a
 what is held within 60 mm before the body may be taken for a wrong mount.
 """
 _END = """
-Not here: goals of the 12-joint server that are preempted or cancelled, and hostile clients of that
-server. Where a goal's last column is empty, its long form did not run to its end
-on this state of the code. Times of ticks and clouds: [benchmarks.md](benchmarks.md).
+Where a goal's last column is empty, its long form did not run to its end on this state of the
+code. Times of ticks and clouds: [benchmarks.md](benchmarks.md).
 """
 
 

@@ -51,6 +51,7 @@ struct SensedPoints {
   std::array<double, kZones> range;  ///< [m] along the ray
   std::array<double, kZones> sigma;  ///< [m] along the ray, larger where the status is uncertain
   std::array<std::uint8_t, kZones> zone;
+  int targets = 0;  ///< zones that saw something, in the workspace or beyond
   int invalid = 0;  ///< zones that are neither target nor empty
   int first_invalid_zone = -1;
 };
