@@ -8,10 +8,12 @@ import pytest
 
 import proxcgal as px
 from proxcgal import _core
+from proxcgal.errors import ConfigError
 from proxcgal.sim.faults import FaultInjector
-from proxcgal.sim.recording import Recorder
+from proxcgal.sim.pictures import snapshots
+from proxcgal.sim.recording import Recorder, read_recording
 from proxcgal.sim.scenario import load_scenario
-from proxcgal.sim.scenario_keys import Fault
+from proxcgal.sim.scenario_keys import INPUT_FAULTS, Fault
 from proxcgal.sim.ticks import TickInput
 from proxcgal.sim.trial import run_trial
 from proxcgal.study.campaign import Trial
@@ -98,7 +100,8 @@ def test_every_status_code_is_judged_as_the_table_has_it() -> None:
 
 
 def through(kind: str, ticks: int) -> list[TickInput]:
-    fault = Fault.model_validate({"kind": kind, "sensor": 0, "from": 0.0})
+    of = {} if kind in INPUT_FAULTS else {"sensor": 0}
+    fault = Fault.model_validate({"kind": kind, "from": 0.0, **of})
     inject = FaultInjector([fault], ["a", "b"], seed=0)
     ranges, status = np.full(64, 0.5), np.full(64, 5, np.uint8)
     return [
@@ -129,6 +132,30 @@ def test_a_run_whose_joint_state_is_never_a_number_is_recorded_to_its_end(tmp_pa
         log = run_trial(scenario, "wb", recorder=recorder)
     assert (log.mode == STOP).all()
     assert log.recording_failure is None
+    drawn = snapshots(read_recording(tmp_path / "nan.mcap"), [0.0, 0.05])
+    assert all((moment.q == scenario.q0).all() for moment in drawn)
+
+
+@pytest.mark.parametrize(
+    ("fault", "told"),
+    [
+        ('kind = "dropout", value = 1.5', "value = 1.5, share of zones lost, 0 to 1: must be from"),
+        ('kind = "mount_turn", value = 1e300', "must be from -3.14159 to 3.14159"),
+        (
+            'kind = "delay", value = -0.1',
+            "value = -0.1, scans arrive this much later [s]: must be from",
+        ),
+        ('kind = "status", value = 4.5', "status code, 0 to 255: must be whole"),
+        (
+            'kind = "joints_nan", sensor = 3',
+            "joints_nan concerns no sensor: sensor is to be left out",
+        ),
+    ],
+)
+def test_a_fault_that_makes_no_sense_is_told_with_what_is_allowed(fault: str, told: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        load_scenario("front_plane", (f"fault=[{{{fault}}}]",))
+    assert told in str(caught.value)
 
 
 ROOT = Path(__file__).parents[1]

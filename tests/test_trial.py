@@ -17,7 +17,7 @@ from proxcgal.sim.ranges import NO_TARGET, VALID
 from proxcgal.sim.recording import Recorder, Recording, read_recording
 from proxcgal.sim.replay import Replay, recorded_log
 from proxcgal.sim.scenario import load_scenario
-from proxcgal.sim.scenario_keys import Fault
+from proxcgal.sim.scenario_keys import INPUT_FAULTS, Fault
 from proxcgal.sim.setup import Setup
 from proxcgal.sim.ticks import TickInput
 from proxcgal.sim.trial import TrialLog, first_difference, recompute, run_trial
@@ -251,7 +251,8 @@ def made_input(counter: int) -> TickInput:
 
 
 def injected(kind: str, **more: object) -> Fault:
-    content = {"kind": kind, "sensor": 2, "from": 0.25, "to": 0.55, **more}
+    of = {} if kind in INPUT_FAULTS else {"sensor": 2}
+    content = {"kind": kind, **of, "from": 0.25, "to": 0.55, **more}
     return Fault.model_validate(content)
 
 

@@ -148,7 +148,7 @@ class _Injected:
 
 def value_of(fault: Fault) -> float:
     """The fault's value, or what it is where the file leaves it out."""
-    usual = FAULT_VALUES.get(fault.kind, ("", 0.0))[1]
+    usual = FAULT_VALUES[fault.kind].default if fault.kind in FAULT_VALUES else 0.0
     return usual if fault.value is None else fault.value
 
 

@@ -38,6 +38,7 @@ class Snapshot:
     cloud_W: Array  #: (n, 3) filtered [m]
     raw_W: Array  #: (n, 3) before body removal [m]
     elapsed: float  #: [s] of the run
+    q: Array  #: (n_q,) where the arm was
 
 
 def snapshots(
@@ -56,10 +57,10 @@ def snapshots(
     wanted = np.minimum(rows, len(recording.ticks) - 1).tolist()
     replay = Replay(recording, controller)
     taken = {}
-    for row, tick in enumerate(replay):
+    for row, (tick, q) in enumerate(zip(replay, recording.postures(), strict=True)):
         if row in wanted:
             elapsed = row * replay.law.config.period
-            taken[row] = Snapshot(tick, replay.law.cloud_W(), replay.law.raw_cloud_W(), elapsed)
+            taken[row] = Snapshot(tick, replay.law.cloud_W(), replay.law.raw_cloud_W(), elapsed, q)
         if row >= max(wanted, default=-1):
             break
     return [taken[row] for row in wanted]
@@ -86,7 +87,7 @@ def draw(
     camera: Camera | None = None,
 ) -> Picture:
     """(height, width, 3) of one snapshot. Raises: SimulationError where nothing can draw."""
-    world.place(snapshot.tick.given.q, snapshot.elapsed)
+    world.place(snapshot.q, snapshot.elapsed)
     return world.picture(list(_marks(snapshot)), size, camera)
 
 

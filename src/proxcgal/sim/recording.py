@@ -47,6 +47,13 @@ class Recording:
     ticks: tuple[Tick, ...]
     damage: str | None  #: where and why reading ended early; None for a whole file
 
+    def postures(self) -> Iterator[Array]:
+        """(n_q,) of each tick, to draw: the last finite one where a joint state is no number."""
+        q = np.array(self.settings.scenario.start()[1])
+        for tick in self.ticks:
+            q = tick.given.q if np.isfinite(tick.given.q).all() else q
+            yield q
+
 
 def read_recording(path: str | Path) -> Recording:
     """Reads all ticks up to the first damage.

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,17 +44,34 @@ FaultKind = Literal[
 INPUT_FAULTS = ("joints_old", "joints_nan", "clock_jump", "late")
 #: Those of the world: where a sensor really sits, other than the skin says.
 MOUNT_FAULTS = ("mount_offset", "mount_turn")
-#: What `value` means to a fault, and what it is where the file leaves it out; others take none.
-FAULT_VALUES: dict[str, tuple[str, float]] = {
-    "dropout": ("share of zones lost, 0 to 1", 0.5),
-    "offset": ("added to every range [m]", 0.05),
-    "delay": ("scans arrive this much later [s]", 0.1),
-    "status": ("every zone's status code, 0 to 255", 4.0),
-    "stamp_offset": ("added to every scan's stamp [s]", 0.03),
-    "joints_old": ("age of the joint state [s]", 0.05),
-    "mount_offset": ("how far the sensor sits from its mount, which way is drawn [m]", 0.005),
-    "mount_turn": ("how far it is turned, about which axis is drawn [rad]", 0.0349),
-    "clock_jump": ("the caller's clock goes on from this much later, or earlier [s]", 3600.0),
+
+
+class FaultValue(NamedTuple):
+    """What `value` means to a fault."""
+
+    meaning: str
+    default: float  #: where the file leaves it out
+    least: float
+    most: float
+
+
+#: Of the kinds that take a value.
+FAULT_VALUES = {
+    "dropout": FaultValue("share of zones lost, 0 to 1", 0.5, 0.0, 1.0),
+    "offset": FaultValue("added to every range [m]", 0.05, -10.0, 10.0),
+    "delay": FaultValue("scans arrive this much later [s]", 0.1, 0.0, 3600.0),
+    "status": FaultValue("every zone's status code, 0 to 255", 4.0, 0.0, 255.0),
+    "stamp_offset": FaultValue("added to every scan's stamp [s]", 0.03, -1e6, 1e6),
+    "joints_old": FaultValue("age of the joint state [s]", 0.05, 0.0, 1e6),
+    "mount_offset": FaultValue(
+        "how far the sensor sits from its mount, which way is drawn [m]", 0.005, -1.0, 1.0
+    ),
+    "mount_turn": FaultValue(
+        "how far it is turned, about which axis is drawn [rad]", 0.0349, -math.pi, math.pi
+    ),
+    "clock_jump": FaultValue(
+        "the caller's clock goes on from this much later, or earlier [s]", 3600.0, -1e6, 1e6
+    ),
 }
 
 
@@ -288,14 +305,17 @@ class Fault(Section):
             raise ValueError(f"kind {self.kind} takes no value; {', '.join(FAULT_VALUES)} do")
         if self.axis is not None and self.kind not in MOUNT_FAULTS:
             raise ValueError(f"kind {self.kind} takes no axis; {', '.join(MOUNT_FAULTS)} do")
-        if self.kind == "dropout" and not 0.0 <= (self.value or 0.0) <= 1.0:
-            raise ValueError("value must be a share between 0 and 1")
-        if self.kind == "delay" and (self.value or 0.0) < 0.0:
-            raise ValueError("value must be a time of at least 0 s")
-        if self.kind == "joints_old" and (self.value or 0.0) < 0.0:
-            raise ValueError("value must be an age of at least 0 s")
-        if self.kind == "status" and (self.value or 0.0) not in range(256):
-            raise ValueError("value must be a whole number from 0 to 255")
+        if self.kind in INPUT_FAULTS and self.sensor != "all":
+            raise ValueError(f"kind {self.kind} concerns no sensor: sensor is to be left out")
+        if self.value is not None:
+            allowed = FAULT_VALUES[self.kind]
+            if not allowed.least <= self.value <= allowed.most:
+                raise ValueError(
+                    f"value = {self.value:g}, {allowed.meaning}: must be from {allowed.least:g} "
+                    f"to {allowed.most:g}"
+                )
+            if self.kind == "status" and self.value != int(self.value):
+                raise ValueError(f"value = {self.value:g}, {allowed.meaning}: must be whole")
         return self
 
 

@@ -31,7 +31,7 @@ class Row:
 
 
 def one(kind: str, value: float | None = None) -> Callable[[int], Sequence[Fault]]:
-    """A fault of one sensor, or of an input that has none."""
+    """A fault of one sensor."""
 
     def faults(sensor: int) -> Sequence[Fault]:
         fault: Fault = {"kind": kind, "sensor": sensor}
@@ -51,7 +51,7 @@ def array(kind: str) -> Callable[[int], Sequence[Fault]]:
 
 
 def every(kind: str, value: float | None = None) -> Callable[[int], Sequence[Fault]]:
-    """The fault of all sensors."""
+    """The fault of all sensors, or of an input that has none."""
 
     def faults(_: int) -> Sequence[Fault]:
         fault: Fault = {"kind": kind, "sensor": "all"}
@@ -105,19 +105,19 @@ ROWS: tuple[Row, ...] = (
     Row(name="all stamps 30 ms early, fast", faults=every("stamp_offset", 0.03), least=HOLD,
         most=HOLD, within=0.2, finding="all_sensors_silent", settings=_FAST),
     Row(name="scans arrive 0.3 s late", faults=one("delay", 0.3), **_BLIND),  # type: ignore[arg-type]
-    Row(name="clock an hour ahead", faults=one("clock_jump", 3600.0), least=RUN, most=RUN,
+    Row(name="clock an hour ahead", faults=every("clock_jump", 3600.0), least=RUN, most=RUN,
         within=0.0, finding="time_invalid", same_commands=_ROUNDING),
-    Row(name="clock an hour back", faults=one("clock_jump", -3600.0), least=RUN, most=RUN,
+    Row(name="clock an hour back", faults=every("clock_jump", -3600.0), least=RUN, most=RUN,
         within=0.0, finding="time_invalid", same_commands=_ROUNDING),
-    Row(name="joint state 50 ms old", faults=one("joints_old", 0.05), least=HOLD, most=HOLD,
+    Row(name="joint state 50 ms old", faults=every("joints_old", 0.05), least=HOLD, most=HOLD,
         within=0.02, finding="joint_state_stale"),
-    Row(name="joint state 150 ms old", faults=one("joints_old", 0.15), least=STOP, most=STOP,
+    Row(name="joint state 150 ms old", faults=every("joints_old", 0.15), least=STOP, most=STOP,
         within=0.02, finding="joint_state_lost"),
-    Row(name="joint state not a number", faults=one("joints_nan"), least=STOP, most=STOP,
+    Row(name="joint state not a number", faults=every("joints_nan"), least=STOP, most=STOP,
         within=0.0, finding="joint_state_invalid", duration=0.01),
-    Row(name="one deadline missed", faults=one("late"), least=RUN, most=RUN, within=0.0,
+    Row(name="one deadline missed", faults=every("late"), least=RUN, most=RUN, within=0.0,
         finding="deadline_missed", duration=0.01),
-    Row(name="deadlines missed", faults=one("late"), least=HOLD, most=HOLD, within=0.04,
+    Row(name="deadlines missed", faults=every("late"), least=HOLD, most=HOLD, within=0.04,
         finding="deadlines_missed"),
     Row(name="mount 5 mm off", faults=one("mount_offset"), least=RUN, most=RUN, within=0.0,
         refused=True),

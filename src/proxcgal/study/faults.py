@@ -113,7 +113,7 @@ def _mount_faults(
     if not there:
         raise ConfigError(f"no sensor sees enough of the arm to tell {row.name!r} at this start")
     sensor, axis = there[int(draw.integers(len(there)))]
-    size = FAULT_VALUES[str(fault["kind"])][1] * float(draw.choice([-1.0, 1.0]))
+    size = FAULT_VALUES[str(fault["kind"])].default * float(draw.choice([-1.0, 1.0]))
     return [fault | {"sensor": sensor, "axis": axis[-1], "value": size}]
 
 
