@@ -62,4 +62,8 @@ class Operator(Section):
         phases = [step.phase for step in self.timeline if step.phase is not None]
         if len(set(phases)) < len(phases):
             raise ValueError(f"timeline: phases {phases}: each name once")
+        if "cycle" in phases:
+            raise ValueError(
+                f"timeline: phases {phases}: 'cycle' is the whole run, not one of them"
+            )
         return self
