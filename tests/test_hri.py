@@ -9,7 +9,11 @@ import numpy as np
 import polars as pl
 import pytest
 
+from proxcgal.errors import ConfigError
 from proxcgal.sim.errand import Errand
+from proxcgal.sim.human.motion import move
+from proxcgal.sim.human.recorded import write_motion
+from proxcgal.sim.human.subject import draw_subject
 from proxcgal.sim.scenario import HriScenario, load_scenario
 from proxcgal.sim.trial import run_trial
 from proxcgal.sim.trial_log import sampled_ticks
@@ -175,6 +179,29 @@ def test_bounds_hold_or_do_not_as_the_numbers_say(campaign: Any) -> None:
     assert "task2: wb >= sm" in failed
     assert "H3_first: interval above -5 mm" in failed
     assert any("DOES NOT HOLD" in sentence for sentence in verdicts(turned))
+
+
+def test_the_same_phase_in_two_scenes_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "other.toml"
+    path.write_text(load_scenario("hri_task1", ['name="hri_other"']).to_toml())
+    wishes = Wishes(runs=1, seed=0, jitter=False, scenarios=("hri_task1", str(path)))
+    with pytest.raises(ConfigError, match=r"other\.toml: phase H1.* hri_task1"):
+        hri.plan(wishes)
+
+
+def test_a_recording_is_no_subject_that_is_drawn(tmp_path: Path) -> None:
+    path = tmp_path / "walk.csv"
+    operator = load_scenario("hri_task1").operator  # type: ignore[attr-defined]
+    write_motion(move(draw_subject(1), operator, 65.0), path)
+    recording = (f'operator.recording="{path}"',)
+    alone = Wishes(runs=1, seed=0, jitter=False, overrides=recording)
+    assert len(hri.plan(alone).trials) == 2 * 4
+    for several in (
+        Wishes(runs=2, seed=0, jitter=False, overrides=recording),
+        Wishes(runs=1, seed=0, overrides=recording),
+    ):
+        with pytest.raises(ConfigError, match=r"operator\.recording .* --subjects 1 --no-jitter"):
+            hri.plan(several)
 
 
 def test_the_papers_figures_stand_beside_ours(campaign: Any) -> None:
