@@ -210,6 +210,22 @@ def test_the_papers_figures_stand_beside_ours(campaign: Any) -> None:
         lines = [line for line in text.splitlines() if row in line]
         assert any(f"{cell['wb'][0]:.3f}" in line for line in lines)
     assert "d_min [m]" in text
+    assert "\n\n" not in text  # a table without units has no row for them
+
+
+def test_the_papers_means_stand_beside_seen_ones_of_ours() -> None:
+    table = table_of(MEANS).filter(pl.col("layout") == "main")
+    axes = figures(table)["subjects.png"].axes[0]
+    diamonds = [line.get_ydata()[0] for line in axes.lines if line.get_marker() == "D"]
+    assert diamonds == pytest.approx([0.35, np.mean([0.28, 0.33, 0.36]) + 0.01])  # none in H3_first
+
+
+def test_whole_body_and_sensor_points_lie_over_the_others() -> None:
+    means = {name: MEANS["wb"] for name in ("wb", "sm", "wb_known", "wb_memory")}
+    table = table_of(means).filter(pl.col("layout") == "main")
+    axes = figures(table)["cycles.png"].axes[0]
+    over = [line.get_zorder() for line in axes.lines[:4]]
+    assert min(over[:2]) > max(over[2:])
 
 
 def test_every_figure_has_a_caption(campaign: Any) -> None:
