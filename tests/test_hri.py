@@ -271,6 +271,20 @@ def test_the_campaign_is_the_same_on_one_worker_and_on_two(
     assert found[0] == found[1]
 
 
+def test_a_run_beside_a_person_has_means_and_no_gain_at_its_end(
+    call: Callable[..., Any], tmp_path: Path
+) -> None:
+    answer = call(
+        "run", "hri_task1", "--subject", "99", "--controller", "wb", "sm", "--no-picture",
+        "--quiet", "--workers", "1", "--out", str(tmp_path / "out"), "--set", *SHORT,
+    )  # fmt: skip
+    assert answer.code == 0, answer.err
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["subject"] == 99
+    assert summary["gain_mm"] is None
+    assert summary["controllers"]["wb"]["mean_m"]["cycle"]["true"] > 0.0
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [
