@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
@@ -172,6 +172,7 @@ def test_a_capsules_ends_move_as_its_twist_says(time: float) -> None:
 
 @settings(deadline=None, max_examples=60)
 @given(along=st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: np.linalg.norm(v) > 1e-3))
+@example(along=(0.0, 2.0**-24, -1.0))  # all but straight down
 def test_upright_brings_z_along_a_direction(along: tuple[float, float, float]) -> None:
     R = upright(np.array(along))
     np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-6)
