@@ -9,7 +9,11 @@ import numpy as np
 import polars as pl
 import pytest
 
+from proxcgal.errors import ConfigError
 from proxcgal.sim.errand import Errand
+from proxcgal.sim.human.motion import move
+from proxcgal.sim.human.recorded import write_motion
+from proxcgal.sim.human.subject import draw_subject
 from proxcgal.sim.scenario import HriScenario, load_scenario
 from proxcgal.sim.trial import run_trial
 from proxcgal.sim.trial_log import sampled_ticks
@@ -177,12 +181,51 @@ def test_bounds_hold_or_do_not_as_the_numbers_say(campaign: Any) -> None:
     assert any("DOES NOT HOLD" in sentence for sentence in verdicts(turned))
 
 
+def test_the_same_phase_in_two_scenes_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "other.toml"
+    path.write_text(load_scenario("hri_task1", ['name="hri_other"']).to_toml())
+    wishes = Wishes(runs=1, seed=0, jitter=False, scenarios=("hri_task1", str(path)))
+    with pytest.raises(ConfigError, match=r"other\.toml: phase H1.* hri_task1"):
+        hri.plan(wishes)
+
+
+def test_a_recording_is_no_subject_that_is_drawn(tmp_path: Path) -> None:
+    path = tmp_path / "walk.csv"
+    operator = load_scenario("hri_task1").operator  # type: ignore[attr-defined]
+    write_motion(move(draw_subject(1), operator, 65.0), path)
+    recording = (f'operator.recording="{path}"',)
+    alone = Wishes(runs=1, seed=0, jitter=False, overrides=recording)
+    assert len(hri.plan(alone).trials) == 2 * 4
+    for several in (
+        Wishes(runs=2, seed=0, jitter=False, overrides=recording),
+        Wishes(runs=1, seed=0, overrides=recording),
+    ):
+        with pytest.raises(ConfigError, match=r"operator\.recording .* --subjects 1 --no-jitter"):
+            hri.plan(several)
+
+
 def test_the_papers_figures_stand_beside_ours(campaign: Any) -> None:
     text = "\n".join(map(str, listings(analyse(table_of(MEANS), campaign))))
     for row, cell in (("Assembly Task 2", PAPER["task2"]), ("first run", PAPER["H3_first"])):
         lines = [line for line in text.splitlines() if row in line]
         assert any(f"{cell['wb'][0]:.3f}" in line for line in lines)
     assert "d_min [m]" in text
+    assert "\n\n" not in text  # a table without units has no row for them
+
+
+def test_the_papers_means_stand_beside_seen_ones_of_ours() -> None:
+    table = table_of(MEANS).filter(pl.col("layout") == "main")
+    axes = figures(table)["subjects.png"].axes[0]
+    diamonds = [line.get_ydata()[0] for line in axes.lines if line.get_marker() == "D"]
+    assert diamonds == pytest.approx([0.35, np.mean([0.28, 0.33, 0.36]) + 0.01])  # none in H3_first
+
+
+def test_whole_body_and_sensor_points_lie_over_the_others() -> None:
+    means = {name: MEANS["wb"] for name in ("wb", "sm", "wb_known", "wb_memory")}
+    table = table_of(means).filter(pl.col("layout") == "main")
+    axes = figures(table)["cycles.png"].axes[0]
+    over = [line.get_zorder() for line in axes.lines[:4]]
+    assert min(over[:2]) > max(over[2:])
 
 
 def test_every_figure_has_a_caption(campaign: Any) -> None:
@@ -226,6 +269,20 @@ def test_the_campaign_is_the_same_on_one_worker_and_on_two(
         found.append(json.dumps(summary))
         assert "A human in the workspace" in (folder / "report.html").read_text()
     assert found[0] == found[1]
+
+
+def test_a_run_beside_a_person_has_means_and_no_gain_at_its_end(
+    call: Callable[..., Any], tmp_path: Path
+) -> None:
+    answer = call(
+        "run", "hri_task1", "--subject", "99", "--controller", "wb", "sm", "--no-picture",
+        "--quiet", "--workers", "1", "--out", str(tmp_path / "out"), "--set", *SHORT,
+    )  # fmt: skip
+    assert answer.code == 0, answer.err
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["subject"] == 99
+    assert summary["gain_mm"] is None
+    assert summary["controllers"]["wb"]["mean_m"]["cycle"]["true"] > 0.0
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
@@ -134,6 +134,7 @@ def test_a_timeline_too_tight_for_somebody_is_told_with_what_they_need() -> None
         ('operator.start="P9"', "start = 'P9' is not among P0, P1"),
         ("operator.timeline.2.at=5.0", "each must be later than the last"),
         ('operator.timeline.3.phase="H1"', "each name once"),
+        ('operator.timeline.3.phase="cycle"', "'cycle' is the whole run"),
         ("goal.offset=[0,0,1]", "exactly one of offset, position and waypoints"),
     ],
 )
@@ -171,6 +172,7 @@ def test_a_capsules_ends_move_as_its_twist_says(time: float) -> None:
 
 @settings(deadline=None, max_examples=60)
 @given(along=st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: np.linalg.norm(v) > 1e-3))
+@example(along=(0.0, 2.0**-24, -1.0))  # all but straight down
 def test_upright_brings_z_along_a_direction(along: tuple[float, float, float]) -> None:
     R = upright(np.array(along))
     np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-6)
@@ -277,6 +279,18 @@ def test_what_is_wrong_with_a_recording_is_told(tmp_path: Path, text: str, told:
         read_motion(path)
     assert told in str(error.value)
     assert str(path) in str(error.value)
+
+
+def test_a_recording_without_one_of_the_hands_is_told_with_moment_and_points(
+    tmp_path: Path,
+) -> None:
+    motion = motion_of("hri_task2", 5)
+    points_W = motion.points_W[::50].copy()
+    points_W[3, POINTS.index("left_hand")] = points_W[3, POINTS.index("left_wrist")]
+    path = tmp_path / "handless.csv"
+    write_motion(Motion(motion.time[::50], points_W, motion.stature), path)
+    with pytest.raises(px.ConfigError, match=r"time = 1\.5: left_wrist and left_hand"):
+        read_motion(path)
 
 
 def test_a_recording_that_is_not_there_is_told(tmp_path: Path) -> None:

@@ -81,7 +81,7 @@ class CampaignOptions:
     """Draws of each scene, runs of each fault and robot, sensed runs of each joint scene and start,
     or subjects; left out: 100, joint 5, hri 20."""
     subjects: Number = None
-    """The same, as hri has it."""
+    """The same, as hri has it: virtual subjects 1 to N, each drawn from --seed and its number."""
     controller: Annotated[
         tuple[ControllerName, ...],
         tyro.conf.arg(metavar="wb|sm|wb_known|wb_memory ...", help_behavior_hint=""),

@@ -16,6 +16,7 @@ from proxcgal.study.analysis import write_bytes
 if TYPE_CHECKING:
     from proxcgal.sim.scenario import Scenario
     from proxcgal.sim.trial import TrialLog
+    from proxcgal.study.figures import Signals
     from proxcgal.study.jobs import Report
 
 DRAWN_SPACING_M = 0.03  # [m] between the obstacle's points in a figure
@@ -28,7 +29,11 @@ def draw_figures(scenario: Scenario, logs: Sequence[TrialLog], folder: Path, rep
 
     law = scenario.controller
     title = f"{scenario.name}: {logs[0].robot}, seed {logs[0].seed}"
-    signals = scenario.signals() if isinstance(scenario, HriScenario) else ()
+    signals: Signals = ()
+    if isinstance(scenario, HriScenario):
+        signals = scenario.signals()
+        if scenario.operator.recording is None:
+            title += f", subject {scenario.operator.subject}"
     figure = time_figure(logs, title=title, d_min=law.d_min, buffer=law.buffer, signals=signals)
     write_bytes(folder / "distance.png", png(figure))
     report(0.5)

@@ -20,7 +20,7 @@ MOVING, STILL = "motion.gif", "motion.png"
 
 
 def show_moving(trials: Sequence[Trial], folder: Path, pool: Pool, *, quiet: bool) -> None:
-    """Draws `motion.gif` and its last frame into a campaign's folder, unless they are there.
+    """Draws `motion.gif` and one of its frames into a campaign's folder, unless they are there.
 
     A machine that cannot draw off screen gets all the rest.
 

@@ -104,6 +104,7 @@ def _summary(scenario: Scenario, logs: Sequence[TrialLog]) -> Summary:
     summary = static_summary(logs)
     if isinstance(scenario, HriScenario):
         summary["subject"] = scenario.operator.subject
+        summary["gain_mm"] = None  # of the run's end, when the person has left
         for log in logs:
             summary["controllers"][log.controller]["mean_m"] = {
                 phase: {"true": true, "seen": seen}

@@ -56,7 +56,8 @@ class RunOptions:
     robot: Annotated[str | None, tyro.conf.arg(metavar="NAME|PATH", help_behavior_hint="")] = None
     """A name that `proxcgal robots` lists, or a .urdf or .xml file, instead of the scenario's."""
     subject: Number = None
-    """Which virtual subject works there, from 1; of scenarios with an operator."""
+    """Which virtual subject works there, any number from 1: stature, arms, speeds, reactions and
+    stance are drawn from it and operator.draw. Of scenarios with an operator."""
     package_dir: Folders = ()
     """Where package:// paths of the robot's file are looked up."""
     seed: Number = None

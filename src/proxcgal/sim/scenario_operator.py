@@ -31,7 +31,7 @@ class Step(Section):
 class Operator(Section):
     """A person in the workspace: drawn from a seed, or played from a recording."""
 
-    subject: Count = Field(1, description="which virtual subject, from 1")
+    subject: Count = Field(1, description="which virtual subject, any number from 1")
     draw: int = Field(0, ge=0, description="seed that the virtual subjects are drawn from")
     recording: str | None = Field(
         None, description="CSV file of a recorded motion, played instead of the timeline's"
@@ -62,4 +62,8 @@ class Operator(Section):
         phases = [step.phase for step in self.timeline if step.phase is not None]
         if len(set(phases)) < len(phases):
             raise ValueError(f"timeline: phases {phases}: each name once")
+        if "cycle" in phases:
+            raise ValueError(
+                f"timeline: phases {phases}: 'cycle' is the whole run, not one of them"
+            )
         return self

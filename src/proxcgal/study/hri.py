@@ -48,6 +48,7 @@ def plan(wishes: Wishes) -> Campaign:
     trials: list[Trial] = []
     redrawn: Counter[str] = Counter()
     scenes: dict[str, str] = {}
+    phases: dict[str, str] = {}  # which scene has each
     keys = [assignment.partition("=")[0].strip() for assignment in wishes.overrides]
     for key in ("seed", "operator.subject", "operator.draw"):
         if key in keys:
@@ -59,6 +60,18 @@ def plan(wishes: Wishes) -> Campaign:
         task = task_of(base)
         if any(trial.tags["task"] == task for trial in trials):
             raise ConfigError(f"--scenario {source}: there is another one named {task}")
+        for phase in base.windows():
+            if phase in phases:
+                raise ConfigError(
+                    f"--scenario {source}: phase {phase} is in {phases[phase]} too: Table II needs "
+                    "another name for it"
+                )
+            phases[phase] = base.name
+        if base.operator.recording is not None and (wishes.runs > 1 or wishes.jitter):
+            raise ConfigError(
+                f"--scenario {source}: operator.recording = {base.operator.recording}: its person "
+                "is always the same, in the same place: needs --subjects 1 --no-jitter"
+            )
         scenes |= identity(base, robot)
         for jitter in (False, True) if wishes.jitter else (False,):
             for subject in range(1, wishes.runs + 1):

@@ -28,6 +28,12 @@ if TYPE_CHECKING:
 
 _DOTTED: Any = (0, (1, 1.5))
 _HIGHEST = 1.35  # [m] of a distance axis: beyond the sensors' workspace
+_LABELS = {
+    "task1": "Task 1", "task2": "Task 2", "H3_first": "H3, first run",
+    "H3_second": "H3, second run",
+}  # fmt: skip
+#: The paper's two are drawn over the others, which lie close to WB.
+_OVER = {"sm": 3, "wb": 4}
 
 
 def figures(table: pl.DataFrame) -> dict[str, Figure]:
@@ -64,7 +70,7 @@ def _trials(main: pl.DataFrame) -> Figure:
     names = [n for n in ("sm", "wb") if n in own["controller"].to_list()]
     names = names or own["controller"].unique(maintain_order=True).to_list()[:2]
     figure = _figure(5.2 * len(names), 5.0)
-    figure.suptitle(f"{task}, subject {subject}", fontsize=12, fontweight="bold")
+    figure.suptitle(f"{_LABELS.get(task, task)}, subject {subject}", fontsize=12, fontweight="bold")
     grid = figure.subplots(
         2, len(names), sharex=True, sharey="row", height_ratios=(2.6, 1.0), squeeze=False
     )
@@ -119,16 +125,20 @@ def _cycles(main: pl.DataFrame) -> Figure:
         for (name,), part in own.group_by(["controller"], maintain_order=True):
             true = series(part, "true_m")
             time = np.arange(true.shape[1]) * SAMPLE_S
-            mean, spread = true.mean(axis=0), true.std(axis=0)
-            colour = COLOURS.get(str(name), "black")
-            label = NAMES.get(str(name), str(name))
-            ax.plot(time, mean, color=colour, linewidth=1.4, label=label)
-            ax.fill_between(
-                time, mean - spread, mean + spread, color=colour, alpha=0.13, linewidth=0.0
-            )
+            mean, colour = true.mean(axis=0), COLOURS.get(str(name), "black")
+            over = _OVER.get(str(name), 2)
+            ax.plot(
+                time, mean, color=colour, linewidth=1.6 if over > 2 else 1.0, zorder=over,
+                label=NAMES.get(str(name), str(name)),
+            )  # fmt: skip
+            if over > 2 and len(true) > 1:
+                spread = true.std(axis=0, ddof=1)  # as sigma_max of the tables
+                ax.fill_between(
+                    time, mean - spread, mean + spread, color=colour, alpha=0.16, linewidth=0.0
+                )
         ax.set_ylim(0.0, _HIGHEST)
         ax.set_xlim(0.0, time[-1])
-        ax.set_title(task, loc="left", fontsize=10, fontweight="bold")
+        ax.set_title(_LABELS.get(task, task), loc="left", fontsize=10, fontweight="bold")
         ax.set_ylabel("true distance [m]", fontsize=10)
         mark_signals((ax,), json.loads(own["signals"][0]))
     axes[-1].set_xlabel("time [s]", fontsize=10)
@@ -152,18 +162,22 @@ def _subjects(main: pl.DataFrame) -> Figure:
             ax.plot(x + spread, values, ".", color=colour, markersize=4, alpha=0.55)
             if len(values):
                 ax.plot([x - 0.08, x + 0.08], [values.mean()] * 2, color=colour, linewidth=2.4)
+            seen = list(subject_means(main, row, seen=True).get(name, {}).values())
+            if seen:
+                ax.plot([x], [np.mean(seen)], "D", color=colour, markersize=5, fillstyle="none")
             printed = PAPER.get(row, {}).get(name)
             if printed is not None:
                 ax.plot([x], [printed[0]], "x", color="black", markersize=6)
-    ax.set_xticks(range(len(rows)), rows)
+    ax.set_xticks(range(len(rows)), [_LABELS.get(row, row) for row in rows])
     ax.set_ylim(bottom=0.0)
-    ax.set_ylabel("mean true distance of a subject [m]", fontsize=10)
+    ax.set_ylabel("mean distance of a subject [m]", fontsize=10)
     handles = [
         Line2D([], [], color=COLOURS.get(name, "black"), marker=".", linewidth=2.0)
         for name in names
     ]
+    handles.append(Line2D([], [], color=GREY, marker="D", linestyle="", fillstyle="none"))
     handles.append(Line2D([], [], color="black", marker="x", linestyle=""))
-    labels = [*(NAMES.get(name, name) for name in names), "the paper's (seen)"]
+    labels = [*(NAMES.get(name, name) for name in names), "ours, seen", "the paper's (seen)"]
     figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), **LEGEND)
     return figure
 
@@ -199,8 +213,8 @@ def _differences(done: pl.DataFrame) -> Figure:
                 markersize=7,
             )  # fmt: skip
     ax.axhline(0.0, color=GREY, linewidth=1.0, linestyle=_DOTTED)
-    ax.set_xticks(range(len(rows)), rows)
-    ax.set_ylabel("wb - sm, mean true distance [mm]", fontsize=10)
+    ax.set_xticks(range(len(rows)), [_LABELS.get(row, row) for row in rows])
+    ax.set_ylabel("WB \N{MINUS SIGN} SM, mean true distance [mm]", fontsize=10)
     handles = [
         Line2D([], [], color=colours[layout], marker="o", linestyle="") for layout in layouts
     ]

@@ -152,12 +152,13 @@ def phase_rows(table: pl.DataFrame) -> list[str]:
 Subjects = dict[str, dict[int, float]]  # a number of each subject [m], by controller
 
 
-def subject_means(table: pl.DataFrame, row: str) -> Subjects:
-    """Mean true distance in a task or phase."""
+def subject_means(table: pl.DataFrame, row: str, *, seen: bool = False) -> Subjects:
+    """Mean true or seen distance in a task or phase."""
     found: Subjects = {}
-    columns = ("controller", "subject", "task", "mean_m", "phase_means")
+    whole = "seen_mean_m" if seen else "mean_m"
+    columns = ("controller", "subject", "task", whole, "phase_means")
     for controller, subject, task, mean, text in table.select(columns).iter_rows():
-        value = mean if task == row else json.loads(text).get(row, [None])[0]
+        value = mean if task == row else json.loads(text).get(row, (None, None))[seen]
         if value is not None:
             found.setdefault(controller, {})[subject] = value
     return found

@@ -231,10 +231,11 @@ def captions(summary: Summary) -> dict[str, str]:
         "over time, the same subject at the same task, (a) sensor points, (b) whole body. Solid: "
         "seen. Dashed: true. Vertical: the signals. Dotted: the thresholds between which the "
         "activation rises. Filled: nothing was in view.",
-        "cycles.png": "Least true distance over the cycle: mean over the subjects and one "
-        "standard deviation to either side; vertical: the signals.",
-        "subjects.png": "Each subject's mean true distance, task by task and phase by phase; "
-        "bars: means over the subjects; crosses: the paper's means, in its own (seen) measure.",
+        "cycles.png": "Least true distance over the cycle: mean over the subjects and, of WB and "
+        "SM, one standard deviation to either side; vertical: the signals.",
+        "subjects.png": "Each subject's mean true distance (dots), task by task, phase by phase; "
+        "bars: means over the subjects; diamonds: means of what was seen; crosses: the paper's, "
+        "seen ones too.",
         "differences.png": "Paired differences of the true means, subject by subject (dots), with "
         "their mean and its 95 % bootstrap interval, in the cell as it is and in moved ones; "
         "crosses: the paper's difference.",

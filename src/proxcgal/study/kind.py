@@ -38,8 +38,10 @@ class Listing:
 
     def __str__(self) -> str:
         """Its lines, for a terminal."""
-        units = [f"[{unit}]" if unit else "" for unit in self.units]
-        return aligned([self.names, units, *self.rows], left=self.left, heads=2)
+        heads = [self.names]
+        if any(self.units):
+            heads.append([f"[{unit}]" if unit else "" for unit in self.units])
+        return aligned([*heads, *self.rows], left=self.left, heads=len(heads))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

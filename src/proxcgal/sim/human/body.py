@@ -85,8 +85,10 @@ def upright(along: Array) -> Array:
     """(..., 3, 3) rotations that turn the world's z axis the least to bring it along (..., 3)."""
     z = along / np.maximum(np.linalg.norm(along, axis=-1, keepdims=True), 1e-12)
     x, y, c = z[..., 0], z[..., 1], z[..., 2]
-    down = c < -1.0 + 1e-9  # no turn is the least one
-    k = 1.0 / (1.0 + np.where(down, 1.0, c))
+    level2 = x * x + y * y
+    down = (c < 0.0) & (level2 < 1e-30)  # no turn is the least one
+    # 1 / (1 + c), which cancels where the direction leads down.
+    k = np.where(c < 0.0, (1.0 - c) / np.maximum(level2, 1e-30), 1.0 / (1.0 + np.maximum(c, 0.0)))
     R = np.empty((*z.shape[:-1], 3, 3))
     R[..., 0, 0], R[..., 0, 1], R[..., 0, 2] = 1.0 - k * x * x, -k * x * y, x
     R[..., 1, 0], R[..., 1, 1], R[..., 1, 2] = -k * x * y, 1.0 - k * y * y, y

@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from proxcgal.errors import ConfigError
-from proxcgal.sim.human.body import POINTS
+from proxcgal.sim.human.body import PARTS, POINTS
 from proxcgal.sim.human.motion import Motion
 from proxcgal.sim.human.subject import SHIN, THIGH
 
 HEADER = ("time", *(f"{point}_{axis}" for point in POINTS for axis in "xyz"))
 _MOST_ROWS = 1_000_000
 _FARTHEST = 100.0  # [m]
+_SHORTEST = 1e-3  # [m] of a part: below it has no direction
 
 
 def write_motion(motion: Motion, path: Path) -> None:
@@ -34,7 +35,7 @@ def read_motion(path: str | Path) -> Motion:
 
     Raises:
         ConfigError: no such file, a column that is missing, a value that is no number, times that
-            do not rise, a body without legs.
+            do not rise, a part of the body without length, a body without legs.
     """
     try:
         with Path(path).open(newline="", encoding="utf-8") as file:
@@ -77,6 +78,14 @@ def read_motion(path: str | Path) -> Motion:
             f"motion {path}: the legs are {leg:.3g} m long, of somebody of {stature:.3g} m: must "
             "be 0.5 to 2.5 m (are the points in metres?)"
         )
+    for part in PARTS:
+        start, end = (points[:, POINTS.index(name)] for name in (part.start, part.end))
+        short = np.flatnonzero(np.linalg.norm(end - start, axis=1) < _SHORTEST)
+        if len(short):
+            raise ConfigError(
+                f"motion {path}: time = {time[short[0]]:g}: {part.start} and {part.end} are at one "
+                f"place: must be {_SHORTEST:g} m apart or more"
+            )
     return Motion(time, points, stature)
 
 
