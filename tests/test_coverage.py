@@ -5,7 +5,7 @@ import pytest
 
 import proxcgal as px
 from proxcgal.sim.blind import blind_volume, distances, last_seen, volume_within
-from proxcgal.sim.coverage import Coverage, coverage_of
+from proxcgal.sim.coverage import Coverage, coverage_of, sightings
 from proxcgal.sim.eyes import Eyes
 from proxcgal.sim.scenario import load_scenario
 from proxcgal.sim.setup import Setup
@@ -53,6 +53,23 @@ def test_shares_of_the_closest_points_add_up(ur10e: px.Robot) -> None:
     again = coverage_of(none, log.q, log.elapsed)
     assert again.remembered == 0.0
     assert again.forgotten == pytest.approx(numbers["remembered_share"])
+
+
+def test_a_moment_tells_what_the_shares_count(ur10e: px.Robot) -> None:
+    scenario = load_scenario("memory_blind_post", ["duration=4.0"])
+    log = run_trial(scenario, "wb", robot=ur10e, sparse_truth=True, coverage=True)
+    assert log.sightings is not None
+    assert log.true_m[log.nearest_tick] == np.nanmin(log.true_m)
+    setup = Setup.of(scenario, ur10e)
+    ticks = range(0, len(log.time), 20)
+    found = sightings(setup, log.q, log.elapsed, ticks)
+    for kind, share in log.coverage.numbers().items():
+        assert np.mean([f"{one.kind}_share" == kind for one in found]) == pytest.approx(share)
+    for one in found:
+        assert (one.kind == "never_seen") == np.isinf(one.age_s)
+        assert one.kind != "remembered" or 0.0 < one.age_s <= 2.0
+    both = sightings(setup, log.q, log.elapsed, (log.nearest_tick, len(log.time) - 1))
+    assert both == log.sightings
 
 
 def test_without_a_scene_there_is_nothing_to_cover(ur10e: px.Robot) -> None:

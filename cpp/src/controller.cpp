@@ -302,7 +302,7 @@ const TickOutput& Controller::tick(double time, const JointVector& q, std::span<
     me.out.timings.filter_us = me.perception.filter_us;
     me.perception.freshness().check(me.clock.now(), me.monitor);
     me.robot->update(q, me.posture);
-    me.perception.remember(me.clock.now(), me.posture);
+    me.perception.remember(me.clock.now(), me.posture, me.monitor);
     me.out.timings.memory_us = me.perception.memory_us;
     me.act(q, me.perception.cloud_W(), true, detail::Velocities(me.none_W), goal);
     me.blame();

@@ -229,11 +229,11 @@ void Perception::let_go(std::size_t id) {
   }
   if (!memory_) return;
   memory_->leave(std::span(sensor.left).first(static_cast<std::size_t>(sensor.n_left)), sensor.view,
-                 *robot_, posture_);
+                 *robot_, posture_, &steps_);
   memory_->see(id, sensor.view);
 }
 
-void Perception::remember(double time, const Posture& posture) {
+void Perception::remember(double time, const Posture& posture, Monitor& monitor) {
   if (!memory_) return;
   Stopwatch watch(timings);
   memory_->update(time);
@@ -242,7 +242,9 @@ void Perception::remember(double time, const Posture& posture) {
   const auto n = static_cast<std::size_t>(points_W.rows());
   const std::span<bool> body(body_.get(), n);
   std::fill(body.begin(), body.end(), true);
-  remove_near_surface(*robot_, posture, points_W, memory_->tolerances(), body, &steps_);
+  const bool complete =
+      remove_near_surface(*robot_, posture, points_W, memory_->tolerances(), body, &steps_);
+  if (!complete) monitor.add({.reason = Reason::kWorkBounded});
   for (bool& mark : body) mark = !mark;
   if (memory_->held() >= 0) body[static_cast<std::size_t>(memory_->held())] = false;
   memory_->forget(body);

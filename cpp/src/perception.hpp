@@ -22,7 +22,7 @@ class Perception {
               Monitor& monitor);
 
   /// Brings in what is remembered. @param posture  of the arm now
-  void remember(double time, const Posture& posture);
+  void remember(double time, const Posture& posture, Monitor& monitor);
 
   Eigen::Map<const Points> cloud_W() const { return {cloud_.data(), n_cloud_, 3}; }
   std::span<const PointOrigin> origins() const {
@@ -105,7 +105,7 @@ class Perception {
   Watched watched_;
   bool in_contact_ = false;
   JointHistory history_;
-  std::int64_t steps_ = kSearchSteps;  // that this tick's filter may still take
+  std::int64_t steps_ = kSearchSteps;  // that this tick's filter and memory may still take
   Posture posture_;                    // where the arm was at the stamp being placed
 
   // Points of the scans of one stamp, side by side.

@@ -1,7 +1,11 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
+#include <optional>
+#include <set>
 
+#include "perception.hpp"
 #include "proxcgal/controller.hpp"
 #include "proxcgal/error.hpp"
 #include "robots.hpp"
@@ -118,6 +122,154 @@ TEST_F(Remembering, AFullMemoryNeverDropsTheNearest) {
   EXPECT_EQ(kept, closest_pair(*robot, posture, all, Method::kFast).distance);
 }
 
+TEST_F(Remembering, AFullMemoryNeverDropsTheNearestAmongThoseInsideALinksBox) {
+  // Most of these lie in the boxes of links, to which all are then equally near.
+  const ScanView elsewhere = [] {
+    ScanView scan = view(0.07, 0.0F);
+    scan.T_WS.translation() = Vector3(0, 0, 100.0);
+    return scan;
+  }();
+  Random random(13);
+  for (int max_points : {3, 5, 16, 64}) {
+    const MemoryConfig config{.voxel = 0.005, .max_points = max_points};
+    Memory small(config, kModel, 1);
+    robot->update(test::posture(random, 6), posture);
+    std::set<detail::VoxelIndex::Key> voxels;
+    const detail::VoxelIndex index(config.voxel, 1);
+    Points all(2000, 3);
+    Eigen::Index n = 0;
+    while (n < all.rows()) {
+      const auto link = static_cast<std::size_t>(random.uniform(0.0, 6.99));
+      Vector3 at_L = random.vector(0.07);
+      at_L.z() = random.uniform(0.0, 0.28);
+      const RememberedPoint left{posture.T_WL[link] * at_L, 0.0, 0.0, {}};
+      // One point a voxel: the next would take its place.
+      if (!voxels.insert(index.key(left.point_W)).second) continue;
+      all.row(n++) = left.point_W.transpose();
+      small.leave({&left, 1}, elsewhere, *robot, posture);
+      ASSERT_LE(small.points_W().rows(), max_points);
+    }
+    const double kept = closest_pair(*robot, posture, small.points_W(), Method::kFast).distance;
+    EXPECT_EQ(kept, closest_pair(*robot, posture, all, Method::kFast).distance) << max_points;
+  }
+}
+
+/// What Memory says of a point and a scan whose zones all tell nothing but where they end, counted
+/// anew in double precision; nothing where it is too close to call.
+std::optional<bool> seen_through(const ScanView& scan, const Vector3& point_W, double voxel) {
+  constexpr double close = 1e-4;
+  const Vector3 p = scan.T_WS.inverse() * point_W;
+  const double pitch = kModel.field_of_view / 8.0, noise = kModel.sigmas * 0.015;
+  if (p.z() < 0.03) return p.z() < 0.01 ? std::optional(false) : std::nullopt;
+  const double far = std::max(noise * p.z(), kModel.sigmas * kModel.sigma_floor) + 0.5 * voxel;
+  const double column = std::atan2(p.x(), p.z()) / pitch + 3.5;
+  const double row = std::atan2(p.y(), p.z()) / pitch + 3.5;
+  for (const double at : {column, row}) {
+    if (at < -close || at > 7.0 + close) return false;
+    if (std::abs(at - std::round(at)) < close || std::abs(at - std::floor(at) - 0.5) < close)
+      return std::nullopt;
+  }
+  bool beyond = true;
+  double nearest = kInfinity;
+  for (const int corner : {0, 1, 8, 9}) {
+    const int zone = 8 * static_cast<int>(row) + static_cast<int>(column) + corner;
+    const double end = scan.empty_to[static_cast<std::size_t>(zone)];
+    if (std::abs(end - p.z() - far) < close) return std::nullopt;
+    beyond = beyond && end > p.z() + far;
+    const double x = p.z() * std::tan((zone % 8 - 3.5) * pitch) - p.x();
+    const double y = p.z() * std::tan((zone / 8 - 3.5) * pitch) - p.y();
+    nearest = std::min(nearest, std::hypot(x, y));
+  }
+  const double round = 0.5 * std::sqrt(3.0) * voxel;
+  if (std::abs(nearest - round) < close) return std::nullopt;
+  return beyond && nearest < round;
+}
+
+TEST_F(Remembering, WhatIsSeenThroughIsClearedWithinThreeTenthsAndNothingElse) {
+  constexpr int sensors = 30, points = 1024;
+  Random random(14);
+  int cleared = 0, stayed = 0;
+  for (int trial = 0; trial < 5; ++trial) {
+    const MemoryConfig config{.max_points = points};
+    Memory crowded(config, kModel, sensors);
+    std::vector<ScanView> scans;
+    for (int s = 0; s < sensors; ++s) {
+      ScanView scan = view(0.0, 0.0F);
+      scan.T_WS.translation() = random.vector(0.3);
+      scan.T_WS.linear() = Eigen::Quaterniond::FromTwoVectors(Vector3::UnitZ(), random.vector(1.0))
+                               .toRotationMatrix();
+      for (float& end : scan.empty_to) end = random.uniform(0.0, 1.0) < 0.1 ? 0.4F : 2.0F;
+      scans.push_back(scan);
+    }
+    std::vector<RememberedPoint> put;
+    std::set<detail::VoxelIndex::Key> voxels;
+    const detail::VoxelIndex index(config.voxel, 1);
+    while (put.size() < static_cast<std::size_t>(points)) {
+      const Vector3 at = random.vector(0.9);
+      if (!voxels.insert(index.key(at)).second) continue;
+      put.push_back({at, 0.0, 0.02, {0, static_cast<int>(put.size() % 64)}});
+      ScanView elsewhere = view(0.0, 0.0F);
+      elsewhere.T_WS.translation() = Vector3(0, 0, 100.0);
+      crowded.leave({&put.back(), 1}, elsewhere, *robot, posture);
+    }
+    // The sensors' scans come one after the other, 15 a second of each, 100 ticks a second.
+    for (int tick = 0; tick < 30; ++tick) {
+      const double time = 0.01 * (tick + 1);
+      for (int s = 0; s < sensors; ++s) {
+        ScanView& scan = scans[static_cast<std::size_t>(s)];
+        const double due = std::floor(15.0 * time + s / 30.0) / 15.0 - s / 450.0;
+        if (!(due > scan.stamp)) continue;
+        scan.stamp = due;
+        crowded.see(static_cast<std::size_t>(s), scan);
+      }
+      crowded.update(time);
+    }
+    std::set<std::array<double, 3>> left;
+    for (Eigen::Index i = 0; i < crowded.points_W().rows(); ++i) {
+      const auto row = crowded.points_W().row(i);
+      left.insert({row.x(), row.y(), row.z()});
+    }
+    for (const RememberedPoint& one : put) {
+      bool through = false, known = true;
+      for (const ScanView& scan : scans) {
+        const auto told = seen_through(scan, one.point_W, config.voxel);
+        through = through || told.value_or(false);
+        known = known && told.has_value();
+      }
+      if (!through && !known) continue;
+      const bool there = left.contains({one.point_W.x(), one.point_W.y(), one.point_W.z()});
+      EXPECT_EQ(there, !through) << one.point_W.transpose();
+      (through ? cleared : stayed) += 1;
+    }
+  }
+  EXPECT_GT(cleared, 500);
+  EXPECT_GT(stayed, 500);
+}
+
+TEST_F(Remembering, EveryPointIsLookedAtThoughScansComeFasterThanARoundTakes) {
+  Memory crowded({.voxel = 0.005, .max_points = 20000}, kModel, 1);
+  ScanView elsewhere = view(0.0, 0.0F);
+  elsewhere.T_WS.translation() = Vector3(0, 0, 100.0);
+  for (int i = 0; i < 49 * 200; ++i) {
+    // Along the middle rays of the zones, a little to the inside; then as many out of view.
+    const auto ray = [](int zone) { return std::tan((zone - 3.49) * kModel.field_of_view / 8.0); };
+    const double z = 0.3 + 0.005 * (i / 49);
+    const RememberedPoint left = point(z * ray(i % 7), z * ray(i / 7 % 7), z);
+    crowded.leave({&left, 1}, elsewhere, *robot, posture);
+  }
+  constexpr int aside = 49 * 200;
+  for (int i = 0; i < aside; ++i) {
+    const RememberedPoint left = point(5.0 + 0.006 * (i % 100), 0.006 * (i / 100), 0.5);
+    crowded.leave({&left, 1}, elsewhere, *robot, posture);
+  }
+  ASSERT_GT(crowded.points_W().rows(), aside + 8000);
+  for (int tick = 1; tick <= 20; ++tick) {
+    crowded.see(0, view(0.01 * tick, 3.0F));  // one at every tick
+    crowded.update(0.01 * tick);
+  }
+  EXPECT_EQ(crowded.points_W().rows(), aside);
+}
+
 TEST_F(Remembering, TheHeldPointOutlivesAnyCrowd) {
   Memory small({.max_points = 16}, kModel, 1);
   const ScanView elsewhere = view(0.07, 0.0F);
@@ -138,7 +290,7 @@ TEST(MemoryConfig, RefusesWhatCannotBe) {
   EXPECT_THROW(MemoryConfig{.memory_s = -1.0}.validate(), ConfigError);
   EXPECT_THROW(MemoryConfig{.memory_s = kInfinity}.validate(), ConfigError);
   EXPECT_THROW(MemoryConfig{.voxel = 0.0}.validate(), ConfigError);
-  EXPECT_THROW(MemoryConfig{.max_points = 0}.validate(), ConfigError);
+  EXPECT_THROW(MemoryConfig{.max_points = 2}.validate(), ConfigError);
   EXPECT_THROW(MemoryConfig{.clear_scans = 0}.validate(), ConfigError);
   EXPECT_THROW(MotionConfig{.window = 0.0}.validate(), ConfigError);
   EXPECT_THROW(MotionConfig{.radius = kInfinity}.validate(), ConfigError);
@@ -290,6 +442,37 @@ TEST_F(WithMemory, WhereTheArmIsNothingIsRemembered) {
     const TickOutput& out = tick(0.05 + 0.01 * step, 0.0, step % 2 == 0 ? 255 : 0);
     EXPECT_GT(out.pair_distance(), 0.02);
   }
+}
+
+TEST_F(WithMemory, AMemoryThatRunsOutOfStepsIsToldAndKeepsWhatItDidNotLookAt) {
+  ControllerConfig near = config();
+  near.filter.tolerance = 0.14;
+  detail::Perception perception(robot, test::ring(), near);
+  Monitor monitor{MonitorConfig{}};
+  for (int i = 0; i < 2; ++i) {
+    std::vector<Scan> scans;
+    for (int s = 0; s < 10; ++s) {
+      Scan scan{.sensor = s, .counter = static_cast<std::uint32_t>(i + 1), .stamp = 0.07 * i};
+      scan.ranges.fill(0.12);
+      scan.status.fill(0);
+      std::fill_n(scan.status.begin(), i == 0 ? kZones : 1, std::uint8_t{5});
+      scans.push_back(scan);
+    }
+    perception.update(0.07 * i, 0.0, q, scans, monitor);
+  }
+  Posture now = robot->make_posture();
+  robot->update(q, now);
+  // A tick asks once; asked again and again, the tick's steps come to their end.
+  monitor.begin();
+  perception.remember(0.07, now, monitor);
+  ASSERT_TRUE(monitor.findings().empty());
+  const Eigen::Index all = perception.cloud_W().rows();
+  ASSERT_GT(all, perception.seen_points() + 50);
+  for (int i = 0; i < 100000 && monitor.findings().empty(); ++i)
+    perception.remember(0.07, now, monitor);
+  ASSERT_EQ(monitor.findings().size(), 1U);
+  EXPECT_EQ(monitor.findings()[0].reason, Reason::kWorkBounded);
+  EXPECT_EQ(perception.cloud_W().rows(), all);
 }
 
 TEST_F(WithMemory, AStuckPayloadClearsNothingAndIsNotRememberedOnceItEnds) {

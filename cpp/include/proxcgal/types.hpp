@@ -97,7 +97,7 @@ enum class Reason : std::uint8_t {
   kOutsideLimits,       ///< a joint is outside its position limits
   kDeadlineMissed,      ///< the caller's word
   kDeadlinesMissed,     ///< too many in a row
-  kWorkBounded,         ///< a search or the filter was cut short: a lower bound, points kept
+  kWorkBounded,         ///< a search, the filter or memory was cut short: a bound, points kept
   kPointsInvalid,       ///< known points or their velocity not finite, or too many
   kMountsUnchecked,     ///< nobody has said yet that the sensors sit where they are said to
 };

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "geometry/point_chunk.hpp"
+#include "proxcgal/pipeline/distance.hpp"
 #include "require.hpp"
 #include "voxel_index.hpp"
 
@@ -53,8 +54,9 @@ void MemoryConfig::validate() const {
   require(std::isfinite(memory_s) && memory_s >= 0.0, "memory.memory_s", memory_s,
           "finite and 0 s or more");
   require(voxel >= 0.005 && voxel <= 0.5, "memory.voxel", voxel, "between 0.005 and 0.5 m");
-  require(max_points >= 1 && max_points <= 65536, "memory.max_points", max_points,
-          "between 1 and 65536");
+  // The one held, the nearest, and one that comes.
+  require(max_points >= 3 && max_points <= 65536, "memory.max_points", max_points,
+          "between 3 and 65536");
   require(clear_scans >= 1 && clear_scans <= 100, "memory.clear_scans", clear_scans,
           "between 1 and 100");
 }
@@ -68,6 +70,7 @@ struct Memory::Impl {
   // One row each, side by side; the first `count` are in use.
   int count = 0;
   int held = -1;
+  int nearest = -1;  // to the arm, when room was last made
   Points points_W;
   std::vector<float> x, y, z;
   std::vector<double> stamp, tolerance;
@@ -84,7 +87,7 @@ struct Memory::Impl {
   // Of `make_room`.
   std::vector<float> bound;  // [m^2] to the arm, from below
   std::vector<float> sorted;
-  float limit = INFINITY;  // [m^2] of those kept when room was last made, in this tick
+  float limit = INFINITY;  // [m^2] what is farther was nothing to keep in this tick
   Points fresh_W = Points::Zero(kZones, 3);
   std::array<float, kZones> fresh_bound{};
 
@@ -155,9 +158,11 @@ struct Memory::Impl {
   void remove(int row) {
     const auto at = static_cast<std::size_t>(row), last = static_cast<std::size_t>(count - 1);
     index.erase(key[at]);
-    if (held == row) held = -1;
+    for (int* stays : {&held, &nearest}) {
+      if (*stays == row) *stays = -1;
+      if (*stays == count - 1) *stays = row;
+    }
     if (at != last) {
-      if (held == count - 1) held = row;
       points_W.row(row) = points_W.row(count - 1);
       for (auto* floats : {&x, &y, &z, &bound}) (*floats)[at] = (*floats)[last];
       for (auto* doubles : {&stamp, &tolerance, &through_stamp}) (*doubles)[at] = (*doubles)[last];
@@ -188,9 +193,13 @@ struct Memory::Impl {
     }
   }
 
-  /// Forgets the farther half; of what is equally far as much as is needed.
-  void make_room(const Robot& robot, const Posture& posture) {
-    bounds(points_W.topRows(count), robot, posture, bound.data());
+  /// Forgets the farther half; of what is equally far as much as is needed. Boxes say what is far,
+  /// but the nearest point is asked for itself: many others may lie inside a box, off its link.
+  void make_room(const Robot& robot, const Posture& posture, std::int64_t* steps) {
+    const auto rows_W = points_W.topRows(count);
+    const ClosestPair pair = closest_pair(robot, posture, rows_W, Method::kFast, {.steps = steps});
+    nearest = pair.point;
+    bounds(rows_W, robot, posture, bound.data());
     std::copy_n(bound.begin(), count, sorted.begin());
     const auto middle = sorted.begin() + count / 2;
     std::nth_element(sorted.begin(), middle, sorted.begin() + count);
@@ -199,14 +208,18 @@ struct Memory::Impl {
     for (const bool equal : {false, true}) {
       for (int row = count - 1; row >= 0 && count > enough; --row) {
         const float squared = bound[static_cast<std::size_t>(row)];
-        if (row != held && (equal ? squared == limit : squared > limit)) remove(row);
+        if (row == held || row == nearest) continue;
+        if (equal ? squared == limit : squared > limit) remove(row);
       }
     }
+    // Rounded up: what comes next may be nearer than the nearest, and yet outside of all boxes.
+    const double reach = pair.distance * pair.distance;
+    limit = std::max(limit, std::nextafter(static_cast<float>(reach), INFINITY));
   }
 
   /// @param points  at most kZones
   void leave(std::span<const RememberedPoint> points, const ScanView& now, const Robot& robot,
-             const Posture& posture) {
+             const Posture& posture, std::int64_t* steps) {
     std::array<const RememberedPoint*, kZones> fresh;
     std::array<bool, kZones> was_through;
     int n = 0;
@@ -225,7 +238,7 @@ struct Memory::Impl {
     }
     for (int i = 0; i < n; ++i) {
       const auto at = static_cast<std::size_t>(i);
-      // Farther than all that was kept when room was made a moment ago.
+      // Farther than what was kept when room was made a moment ago, and than the nearest of it.
       if (tight && fresh_bound[at] > limit) continue;
       const auto voxel = index.key(fresh[at]->point_W);
       int row = index.find(voxel);
@@ -233,7 +246,7 @@ struct Memory::Impl {
         if (fresh[at]->stamp < stamp[static_cast<std::size_t>(row)]) continue;
       } else {
         if (count == config.max_points) {
-          make_room(robot, posture);
+          make_room(robot, posture, steps);
           if (fresh_bound[at] > limit || count == config.max_points) continue;
         }
         row = count++;
@@ -292,16 +305,18 @@ Memory::~Memory() = default;
 Memory::Memory(Memory&&) noexcept = default;
 
 void Memory::leave(std::span<const RememberedPoint> points, const ScanView& now, const Robot& robot,
-                   const Posture& posture) {
+                   const Posture& posture, std::int64_t* steps) {
   Impl& me = *impl_;
   for (std::size_t begin = 0; begin < points.size(); begin += kZones)
     me.leave(points.subspan(begin, std::min<std::size_t>(kZones, points.size() - begin)), now,
-             robot, posture);
+             robot, posture, steps);
 }
 
 void Memory::see(std::size_t sensor, const ScanView& view) {
   impl_->views[sensor] = view;
-  impl_->next[sensor] = impl_->count - 1;
+  // A round that is not done goes on with the new scan: from the first row again, it might never
+  // come to the last.
+  if (impl_->next[sensor] < 0) impl_->next[sensor] = impl_->count - 1;
 }
 
 void Memory::update(double time) {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,8 @@ from proxcgal.sim.frames import inverse, placed
 from proxcgal.sim.truth import Truth
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from proxcgal.sim.setup import Setup
 
 Array = NDArray[np.float64]
@@ -38,6 +40,14 @@ class Coverage:
 NO_COVERAGE = Coverage()
 
 
+@dataclass(frozen=True, slots=True)
+class Sighting:
+    """What the sensors had of the truly closest point at one moment."""
+
+    kind: Literal["in_view", "remembered", "forgotten", "never_seen"]
+    age_s: float  #: [s] from the last scan that had it in view to then, inf: none had
+
+
 def coverage_of(setup: Setup, q: Array, elapsed: Array) -> Coverage:
     """How long ago the sensors had each truly closest point in view.
 
@@ -51,10 +61,26 @@ def coverage_of(setup: Setup, q: Array, elapsed: Array) -> Coverage:
     """
     if not setup.measured.solids or not len(elapsed):
         return NO_COVERAGE
+    step = max(round(EVERY_S / (elapsed[1] - elapsed[0])) if len(elapsed) > 1 else 1, 1)
+    found = [one.kind for one in sightings(setup, q, elapsed, range(0, len(elapsed), step))]
+    return Coverage(*(found.count(kind) / len(found) for kind in (
+        "in_view", "remembered", "forgotten", "never_seen"
+    )))  # fmt: skip
+
+
+def sightings(setup: Setup, q: Array, elapsed: Array, ticks: Sequence[int]) -> tuple[Sighting, ...]:
+    """How long ago the sensors had the truly closest point of each of these ticks in view.
+
+    Args:
+        setup: scenario, robot, sensors and scene, which holds something.
+        q: (n, n_q) posture of each tick of the run.
+        elapsed: (n,) [s] since the run began.
+        ticks: rows of these, ascending.
+    """
     memory_s = setup.scenario.controller.memory.memory_s
     scan_s = 1.0 / setup.scenario.simulation.sensor_hz
-    step = max(round(EVERY_S / (elapsed[1] - elapsed[0])) if len(elapsed) > 1 else 1, 1)
-    moments, postures = elapsed[::step], q[::step]
+    rows = np.asarray(ticks, np.intp)
+    moments, postures = elapsed[rows], q[rows]
     truth, names = Truth(setup.robot, setup.measured), list(setup.measured.names)
     solids = np.zeros(len(moments), np.intp)
     points_O = np.zeros((len(moments), 3))  # on their solids, which may move
@@ -67,12 +93,12 @@ def coverage_of(setup: Setup, q: Array, elapsed: Array) -> Coverage:
     seen = _last_seen(setup, q, elapsed, moments, solids, points_O)
     ages = moments - seen
     current = np.floor(moments / scan_s + 1e-9) * scan_s
-    in_view = seen >= current - 1e-9
-    remembered = ~in_view & (ages <= memory_s)
-    forgotten = ~in_view & ~remembered & np.isfinite(seen)
-    return Coverage(*(float(part.mean()) for part in (
-        in_view, remembered, forgotten, ~np.isfinite(seen)
-    )))  # fmt: skip
+    kinds = np.select(
+        [seen >= current - 1e-9, ages <= memory_s, np.isfinite(seen)],
+        ["in_view", "remembered", "forgotten"],
+        "never_seen",
+    )
+    return tuple(Sighting(kind.item(), float(age)) for kind, age in zip(kinds, ages, strict=True))
 
 
 def _last_seen(

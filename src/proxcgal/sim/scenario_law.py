@@ -127,7 +127,7 @@ class Memory(Section):
     )
     voxel: Positive = like("MemoryConfig", "voxel", "[m] edge; each holds one point, the newest")
     max_points: Count = like(
-        "MemoryConfig", "max_points", "beyond, those farthest from the arm are forgotten"
+        "MemoryConfig", "max_points", "3 or more; beyond, the farthest from the arm are forgotten"
     )
     clear_scans: Count = like(
         "MemoryConfig", "clear_scans", "that must see through a point before it counts as gone"

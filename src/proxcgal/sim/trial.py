@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from proxcgal import _core
 from proxcgal.models import Robot
-from proxcgal.sim.coverage import coverage_of
+from proxcgal.sim.coverage import coverage_of, sightings
 from proxcgal.sim.decisive import decisive_truth
 from proxcgal.sim.faults import FaultInjector
 from proxcgal.sim.finish import Ending, GoalWatch
@@ -129,7 +129,12 @@ def run_trial(
     )  # fmt: skip
     if not coverage:
         return log_of_run
-    return replace(log_of_run, coverage=coverage_of(setup, np.array(reached), elapsed))
+    found = replace(log_of_run, coverage=coverage_of(setup, np.array(reached), elapsed))
+    if not setup.measured.solids or not ticks:
+        return found
+    moments = (found.nearest_tick, len(ticks) - 1)
+    at_nearest, at_end = sightings(setup, np.array(reached), elapsed, moments)
+    return replace(found, sightings=(at_nearest, at_end))
 
 
 def _with_truth(

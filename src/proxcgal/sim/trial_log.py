@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxcgal.models import Robot
-from proxcgal.sim.coverage import NO_COVERAGE, Coverage
+from proxcgal.sim.coverage import NO_COVERAGE, Coverage, Sighting
 from proxcgal.sim.finish import Ending
 from proxcgal.sim.ticks import TaskResult, Tick, TickResult
 
@@ -53,6 +53,8 @@ class TrialLog:
     findings: dict[str, int]  #: in how many ticks each reason was found
     tick_us: Array  #: (n,) wall time of the controller's call
     coverage: Coverage = NO_COVERAGE  #: nan where not asked for
+    #: Of the truly closest point at the nearest tick and at the last; None as above, or no scene.
+    sightings: tuple[Sighting, Sighting] | None = None
     recording_failure: str | None = None  #: why the recording stopped early
     ending: Ending | None = None  #: how it ended, where a scene says when a run is over
     task_names: tuple[str, ...] = ()  #: of each level, the most important first
@@ -114,6 +116,12 @@ class TrialLog:
             ending=ending,
             **_tasks(results),
         )
+
+    @property
+    def nearest_tick(self) -> int:
+        """The first of those that are truly nearest to the scene; 0 where none was asked."""
+        asked = np.where(np.isnan(self.true_m), np.inf, self.true_m)
+        return int(asked.argmin()) if len(asked) else 0
 
     def summary(self) -> dict[str, float | int]:
         """The run's numbers, as experiments report them; distances in metres."""

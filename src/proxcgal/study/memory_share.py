@@ -87,23 +87,46 @@ def _worse(table: pl.DataFrame, draw: int, measure: str, apart_mm: float) -> Sum
     )
     return {
         "draw": draw, "apart_mm": apart_mm, "wb_m": wb[measure], "wb_memory_m": memory[measure],
-        "reason": _reason(wb, memory),
+        "reason": _reason(wb, memory, measure.removesuffix("_m")),
     }  # fmt: skip
 
 
-def _reason(wb: Summary, memory: Summary) -> str:
-    """What differs between the two trials, the first that does."""
-    if memory["held_ticks"] > wb["held_ticks"]:
+def _reason(wb: Summary, memory: Summary, moment: str) -> str:
+    """Where the ways part, then what each trial knew at its own moment, true_min or true_final."""
+    told = (_parting(wb, memory), _knew(memory, moment, "with it"), _knew(wb, moment, "without"))
+    return "; ".join(told)
+
+
+def _parting(wb: Summary, memory: Summary) -> str:
+    if memory["held_ticks"] != wb["held_ticks"]:
         return f"held for {memory['held_ticks']} ticks, against {wb['held_ticks']} without memory"
     errors = memory["goal_error_m"], wb["goal_error_m"]
     if abs(errors[0] - errors[1]) > _ANOTHER_WAY_M:
         return f"another way: ends {errors[0]:.3f} m from the goal, against {errors[1]:.3f} m"
-    if memory["true_min_link"] != wb["true_min_link"]:
-        return f"{memory['true_min_link']} comes nearest, against {wb['true_min_link']}"
-    return (
-        f"the same way, pushed off by what is remembered: {memory['true_min_link']} comes nearest "
-        "in both"
-    )
+    return "to the same end"
+
+
+def _knew(row: Summary, moment: str, name: str) -> str:
+    """One trial at one moment: which link came how near to what, and what was believed then."""
+    link = row[f"{moment}_link"] or "the arm"
+    told = f"{name}, at {row[f'{moment}_s']:.1f} s {link} is nearest, to what "
+    age = row[f"sighting_age_at_{moment}_s"]
+    told += {
+        "in_view": "was in view",
+        "remembered": f"was last in view {_ago(age)}, so within the memory's time",
+        "forgotten": f"was last in view {_ago(age)}, longer than the memory's time",
+        "never_seen": "no scan had had in view",
+    }[row[f"sighting_at_{moment}"]]
+    seen = row[f"seen_at_{moment}_m"]
+    if seen >= NOTHING_M:
+        return f"{told}; nothing was believed near"
+    believed = row[f"believed_at_{moment}_link"]
+    at = f" at {believed}" if believed else ""
+    return f"{told}, and the nearest believed was {seen:.3f} m off{at}"
+
+
+def _ago(age: float | None) -> str:
+    return "at an unknown time" if age is None else f"{age:.2f} s before"
 
 
 def memory_rows(scene: str, found: Summary | None) -> list[Sequence[str]]:
@@ -136,13 +159,13 @@ def memory_sentences(scene: str, found: Summary | None) -> list[str]:
         part = found[measure]
         if part["closed_share"] is None:
             told.append(f"{scene}: {where} sensing costs nothing in the mean: no share to close.")
-            continue
-        percent = _percent(part)
-        told.append(
-            f"{scene}: {where} memory closes {percent[0]} % of what sensing costs (95 % interval "
-            f"{percent[1]} to {percent[2]} %; {part['regained_mean_mm']:+.1f} of "
-            f"{part['lost_mean_mm']:+.1f} mm in the mean of {part['pairs']} draws)."
-        )
+        else:
+            percent = _percent(part)
+            told.append(
+                f"{scene}: {where} memory closes {percent[0]} % of what sensing costs (95 % "
+                f"interval {percent[1]} to {percent[2]} %; {part['regained_mean_mm']:+.1f} of "
+                f"{part['lost_mean_mm']:+.1f} mm in the mean of {part['pairs']} draws)."
+            )
         told += [
             f"{scene}, draw {case['draw']}: {where} nearer by {-case['apart_mm']:.0f} mm with "
             f"memory: {case['reason']}."

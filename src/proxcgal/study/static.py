@@ -36,6 +36,16 @@ SCENES = ("front_plane", "side_plane")
 UNSEEN_M = 0.05
 #: Controllers whose closest points are looked up among what the sensors had in view.
 LOOKED_AT = ("wb", "wb_memory")
+#: At the nearest moment and at the end: when, which link, what the cloud showed, and of the truly
+#: closest point what the sensors had (`sim.coverage`; LOOKED_AT only) and how long before.
+MOMENT_KEYS = tuple(
+    form.format(name)
+    for name in ("true_min", "true_final")
+    for form in (
+        "{}_s", "{}_link", "seen_at_{}_m", "believed_at_{}_link", "sighting_at_{}",
+        "sighting_age_at_{}_s",
+    )
+)  # fmt: skip
 _HELD = 2  # modes from here on: HOLD, STOP
 _AXES = ("x", "y", "z")
 _ANGLES = ("roll", "pitch", "yaw")
@@ -93,9 +103,16 @@ def perform(trial: Trial, report: Report) -> Row:
     numbers = log.summary()
     row: Row = {key: numbers[key] for key in CONTROLLER_KEYS}
     row |= {key: finite(share) for key, share in log.coverage.numbers().items()}
-    nearest = int(np.nanargmin(log.true_m))
-    row["true_min_link"] = log.true_link[nearest]
-    row["seen_at_true_min_m"] = min(float(log.seen_m[nearest]), NOTHING_M)
+    for name, tick in (("true_min", log.nearest_tick), ("true_final", len(log.time) - 1)):
+        row[f"{name}_s"] = float(log.elapsed[tick])
+        row[f"{name}_link"] = log.true_link[tick]
+        row[f"seen_at_{name}_m"] = min(float(log.seen_m[tick]), NOTHING_M)
+        row[f"believed_at_{name}_link"] = log.control_link[tick]
+    kinds = log.sightings or (None, None)
+    for name, sighting in zip(("true_min", "true_final"), kinds, strict=True):
+        known = sighting is not None and np.isfinite(sighting.age_s)
+        row[f"sighting_at_{name}"] = sighting.kind if sighting else None
+        row[f"sighting_age_at_{name}_s"] = sighting.age_s if sighting and known else None
     row["leaked_points_max"] = numbers["leaked_points_max"]
     row["held_ticks"] = int((log.mode >= _HELD).sum())
     return row | _drawn(trial.scenario)
@@ -117,7 +134,7 @@ def _drawn(scenario: Scenario) -> Row:
 
 
 def _columns(trial: Trial) -> tuple[str, ...]:
-    own = ("true_min_link", "seen_at_true_min_m", "leaked_points_max", "held_ticks")
+    own = (*MOMENT_KEYS, "leaked_points_max", "held_ticks")
     return (*CONTROLLER_KEYS, *COVERAGE_KEYS, *own, *_drawn(trial.scenario))
 
 

@@ -12,7 +12,7 @@ namespace proxcgal {
 struct MemoryConfig {
   double memory_s = 2.0;  ///< [s] age at which a point is forgotten in any case; 0: none is kept
   double voxel = 0.05;    ///< [m] edge; each holds one point, the newest
-  int max_points = 1024;  ///< beyond, those farthest from the arm are forgotten
+  int max_points = 1024;  ///< 3 or more; beyond, those farthest from the arm are forgotten
   int clear_scans = 2;    ///< scans that must see through a point before it counts as gone
 
   /// @throws ConfigError  with the field, its value and its bounds
@@ -49,9 +49,15 @@ struct RememberedPoint {
 ///   - when a scan sees that surface again: the scan's own point stands for it;
 ///   - when the rays round it end well beyond it, in `clear_scans` scans: it is gone;
 ///   - when it is `memory_s` old;
-///   - when there are too many, and it is one of those farthest from the arm.
+///   - when there are too many, and it is one of those farthest from the arm; never the nearest.
 /// A zone is a cone of 5.6 deg of which only the middle ray is proved empty: a point is seen
-/// through where all four rays next to it end beyond it, and the nearest passes its voxel.
+/// through where all four rays next to it end beyond it, and the nearest passes its voxel. Outside
+/// the middle rays of the outermost zones there are no four: what only those pass stays until it is
+/// old, for the thing seen there may reach on beyond the view.
+///
+/// Looking through the points is bounded in each tick, by 8192 pairs of point and scan: within six
+/// ticks (the time from scan to scan at 15 Hz) some 45 sensors look at 1024 points. More sensors or
+/// points take longer.
 class Memory {
  public:
   /// @param sensors  that will see
@@ -61,8 +67,10 @@ class Memory {
 
   /// The points of a sensor's last scan, now that its next one is there.
   /// @param posture  of the arm: what is near to it is kept
+  /// @param steps    that looking for the nearest may take where room is made, counted down where
+  ///                 given; below 0 it was cut short, and the nearest may be forgotten
   void leave(std::span<const RememberedPoint> points, const ScanView& now, const Robot& robot,
-             const Posture& posture);
+             const Posture& posture, std::int64_t* steps = nullptr);
   /// A new scan: what it sees through, or sees again, is worked off in this tick and the next.
   void see(std::size_t sensor, const ScanView& view);
   /// Forgets what is too old, and what the scans have shown to be gone or there.
