@@ -193,6 +193,17 @@ struct Controller::Impl {
     }
   }
 
+  /// The limits of a nominal period, with no more change of velocity than the time since the last
+  /// command allows: a tick may come early. Braking in time stays possible: until the next command
+  /// the joint moves at this one for a nominal period at most.
+  Admissible admissible_now(const JointVector& q, double scale) const {
+    Admissible box = admissible(limits, q, qd_last, config.period, scale);
+    const JointVector change = clock.step() * limits.qdd_max;
+    box.low = box.steady_low.cwiseMax(qd_last - change).cwiseMin(qd_last + change);
+    box.high = box.steady_high.cwiseMax(qd_last - change).cwiseMin(qd_last + change);
+    return box;
+  }
+
   /// What each task wanted, and what is missing of it in the command that is issued.
   void report() {
     for (std::size_t level = 0; level < config.tasks.size(); ++level) {
@@ -230,7 +241,7 @@ struct Controller::Impl {
     solve(tasks, robot->n_q(), limits.qd_max, config.solver, solution);
     // By the last tick's mode: this one's findings are not complete yet.
     const double scale = monitor.slowed() ? config.monitor.degraded_scale : 1.0;
-    const Admissible box = admissible(limits, q, qd_last, config.period, scale);
+    const Admissible box = admissible_now(q, scale);
     command({solution.rho.data(), static_cast<std::size_t>(solution.levels) + 1}, tasks, qd_last,
             box, out.qd);
     // What is known to be there has the last word over what may be where nothing is seen.
@@ -256,7 +267,7 @@ struct Controller::Impl {
     out.mode = monitor.conclude();
     if (!usable || out.mode >= Mode::kHold) {
       const JointVector& at = usable ? q : posture.q;  // the last posture that could be trusted
-      const Admissible box = admissible(limits, at, qd_last, config.period, 1.0);
+      const Admissible box = admissible_now(at, 1.0);
       decelerate(qd_last, box, out.qd);
       if (usable) caution.keep_off(posture, box, out);
     }
