@@ -162,8 +162,21 @@ struct Controller::Impl {
     return reach;
   }
 
+  /// Is it acceleration alone that avoidance is short of, as after a HOLD that has cleared? Then
+  /// the position and velocity limits let the row have its share once there was time.
+  bool in_time(std::size_t level, Eigen::Index row, const Admissible& box) const {
+    Admissible steady = box;
+    steady.low = box.steady_low;
+    steady.high = box.steady_high;
+    JointVector qd = out.qd;
+    command({solution.rho.data(), static_cast<std::size_t>(solution.levels) + 1},
+            std::span<const Task>(stack.data(), config.tasks.size()), qd_last, steady, qd);
+    return !(residual(stack[level], qd)[row] > kExecuted * stack[level].rate[row]);
+  }
+
   /// Was avoidance asked for more than the command gives?
-  void judge() {
+  /// @param cut_back  the command was cut back for what is not seen: more time would not help
+  void judge(const Admissible& box, bool cut_back) {
     for (std::size_t level = 0; level < config.tasks.size(); ++level) {
       if (!std::holds_alternative<Avoidance>(config.tasks[level])) continue;
       const Task& task = stack[level];
@@ -175,7 +188,7 @@ struct Controller::Impl {
           // Outside d_min the goal may well hold against it: there the arm may come to rest.
           // The baseline moves another point than the pair's, and is left as it is published.
           const bool whole_body = config.control_point == ControlPoint::kWholeBody;
-          stuck(whole_body && caution.inside(out));
+          stuck(whole_body && caution.inside(out) && (cut_back || !in_time(level, row, box)));
           return;
         }
       }
@@ -245,10 +258,12 @@ struct Controller::Impl {
     command({solution.rho.data(), static_cast<std::size_t>(solution.levels) + 1}, tasks, qd_last,
             box, out.qd);
     // What is known to be there has the last word over what may be where nothing is seen.
+    const JointVector solved = out.qd;
     if (sensed) caution.slow_into_unseen(clock.now(), posture, perception, box, out, monitor);
+    const bool cut_back = (out.qd.array() != solved.array()).any();
     caution.keep_off(posture, box, out);
     out.timings.solve_us = watch.lap_us();
-    judge();
+    judge(box, cut_back);
     if ((q.array() < limits.q_min.array() || q.array() > limits.q_max.array()).any())
       note(Reason::kOutsideLimits);
   }

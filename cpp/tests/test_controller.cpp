@@ -355,6 +355,35 @@ TEST(Controller, InsideTheLeastDistanceNothingComesNearer) {
   EXPECT_GT(inside, 300);
 }
 
+TEST(Controller, AHoldInsideTheLeastDistanceClearsAndTheArmMovesOff) {
+  const auto robot = test::arm();
+  Controller controller(robot, Skin{}, ControllerConfig{});
+  JointVector q = bent();
+  Posture posture = robot->make_posture();
+  robot->update(q, posture);
+  const Pose goal = posture.T_WT;
+  Pose bad = goal;
+  bad.translation().x() = std::nan("");
+  Points near(1, 3);
+  near.row(0) = (goal.translation() + Vector3(0.15, 0.0, 0.0)).transpose();
+  double before = 0.0, after = 0.0;
+  for (int i = 0; i < 200; ++i) {
+    const TickOutput& out = controller.tick_known(0.01 * i, q, near, i < 30 ? bad : goal);
+    if (i < 30) {
+      ASSERT_EQ(out.mode, Mode::kHold);
+    } else if (i == 30) {
+      before = out.pair_distance();
+      ASSERT_LT(before, 0.2);
+    }
+    after = out.pair_distance();
+    if (i > 45) {
+      ASSERT_EQ(out.mode, Mode::kRun);
+    }
+    q += 0.01 * out.qd;
+  }
+  EXPECT_GT(after, before + 0.02);
+}
+
 TEST(Controller, AnObstacleThatTouchesIsNotTakenForBody) {
   const auto robot = test::arm();
   Controller controller(robot, test::looking_back(), ControllerConfig{});
