@@ -402,6 +402,11 @@ void Controller::retune(const std::vector<TaskSpec>& tasks) {
     throw ConfigError("tasks: other values are taken for the same tasks in the same order: " +
                       names);
   }
+  for (std::size_t level = 0; level < tasks.size(); ++level) {
+    const auto* to = std::get_if<SelfCollision>(&tasks[level]);
+    if (to != nullptr && to->pairs != std::get<SelfCollision>(mine[level]).pairs)
+      throw ConfigError("self_collision.pairs: are chosen at set-up; the other values may change");
+  }
   ControllerConfig changed = impl_->config;
   changed.tasks = tasks;
   changed.validate();
