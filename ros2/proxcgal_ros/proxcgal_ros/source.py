@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable
 
 import numpy as np
@@ -36,6 +36,8 @@ STEADY = 10  # joint states in a row that were not stale, before the first tick
 BACKLOG = 50  # events that are looked through for one
 SOON = 0.15  # of a period, on both sides: scans wait for a joint state that is expected then
 EARLY_TICKS = 2  # for each array between two joint states; more scans wait for the next one
+STILL = 1e-4  # [rad] or [m] of any joint
+PATIENCE = 5.0  # [s]
 KEPT_SCANS = 4  # of each sensor between two ticks; more are an attack or a fault
 
 
@@ -91,6 +93,7 @@ class RosSource:
             JointState, topics.JOINT_STATES, self._take_joints, topics.NEWEST_QOS
         )
         arrays = topics.arrays([mount.name for mount in setup.skin.mounts])
+        self._sensors = len(setup.skin)
         self._most_early = EARLY_TICKS * len(arrays)
         for name, rows in arrays.items():
             node.create_subscription(
@@ -115,6 +118,33 @@ class RosSource:
             if self._seen and self._may_be_early():
                 return self._between()
         return None
+
+    def standing(self, count: int) -> tuple[Array | None, list[_core.Scan]]:
+        """Where the arm stands (n_q,), before the first tick, and scans from there.
+
+        Args:
+            count: of each sensor; of those that tell less in `PATIENCE`, what there is.
+
+        Returns:
+            None and none where the node is to end.
+        """
+        q: Array | None = None
+        kept: list[_core.Scan] = []
+        while self._running():
+            self._executor.spin_once(timeout_sec=0.1)
+            if self._q is None:
+                continue
+            if q is None or np.abs(self._q - q).max() > STILL:
+                q, kept, end = self._q, [], self._clocks.now() + PATIENCE
+            else:
+                kept += self._scans
+            self._scans.clear()
+            told = Counter(scan.sensor for scan in kept)
+            enough = all(told[row] >= count for row in range(self._sensors))
+            if enough or self._clocks.now() > end:
+                self._steady, self._seen = 0, False
+                return q, kept
+        return None, []
 
     def command(self, qd: Array) -> None:
         """Joint velocities (n_q,) until the next tick."""
