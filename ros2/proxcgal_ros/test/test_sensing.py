@@ -220,3 +220,22 @@ def test_sensors_that_sit_elsewhere_end_the_node_before_it_commands(
     processes.start("right", "node", *PATIENT, *checked)
     assert client.until(lambda: heard and heard[-1][1].mode == Proximity.RUN, 60.0)
     assert "none wrong" in processes.said("right")
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ("d_min:=5.0", "d_min = 5.0: must be a number with a point, such as 0.2, from 0.02 to 1"),
+        ("d_min:=1", "d_min = 1: must be a number with a point"),
+        ("d_min:=near", "d_min = near: must be a number with a point"),
+        ("scenario:=3", "scenario = 3: must be a text"),
+        ("reset_service:=2", "reset_service = 2: must be true or false"),
+        ("controller:=best", "controller = 'best': must be wb or sm or wb_memory"),
+    ],
+)
+def test_a_parameter_that_cannot_be_ends_the_node_with_a_line(
+    processes: Processes, given: str, told: str
+) -> None:
+    assert processes.start("node", "node", "--ros-args", "-p", given).wait(30.0) == 2
+    assert f"error: parameter {told}" in processes.said("node")
+    assert "Traceback" not in processes.said("node")
