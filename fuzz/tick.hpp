@@ -84,7 +84,8 @@ class TickHarness {
 
   std::string step() {
     const int odd = bytes_.byte();  // its bits: what is unusual about this tick
-    if ((odd & 0x81) == 0x81) disturb_joints();
+    const bool disturbed = (odd & 0x81) == 0x81;
+    if (disturbed) disturb_joints();
     if ((odd & 0x82) == 0x82) goal_ = any_goal();
     if ((odd & 0x84) == 0x84) controller_.reset();
     const bool late = (odd & 0x88) == 0x88;
@@ -92,7 +93,8 @@ class TickHarness {
     time_ += step;
     if (!std::isfinite(time_)) time_ = step - step == 0.0 ? step : 0.0;
     const double time = (odd & 0xA0) == 0xA0 ? bytes_.any() : time_;
-    checks_.before();
+    checks_.before(time);
+    if (!disturbed && q_.size() == robot_->n_q()) q_ += checks_.step() * checks_.last();
     std::string violation;
     if ((odd & 0x40) != 0) {
       change_points();
@@ -115,7 +117,6 @@ class TickHarness {
       const Points cloud = controller_.cloud_W();
       violation = checks_.after(q_, goal_, &cloud, out);
     }
-    if (q_.size() == robot_->n_q()) q_ += config_.period * checks_.last();
     return violation;
   }
 

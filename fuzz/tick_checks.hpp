@@ -1,5 +1,7 @@
 #pragma once
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <sstream>
 #include <string>
 
@@ -31,7 +33,17 @@ class TickChecks {
   /// The last command that was issued.
   const JointVector& last() const { return last_; }
   const TickCounts& counts() const { return counts_; }
-  void before() { before_ = last_; }
+  /// @param time  of the tick to come, on the caller's clock: a good one counts, by the nominal
+  ///              period at most and by the fiftieth part of it at least
+  void before(double time) {
+    before_ = last_;
+    const double period = controller_.config().period, step = time - time_;
+    const bool early = step > 0.0 && step < (1.0 - 1e-6) * period;
+    step_ = early ? std::max(step, 0.02 * period) : period;
+    if (std::isfinite(time)) time_ = time;
+  }
+  /// [s] that the arm has moved with the last command.
+  double step() const { return step_; }
 
   /// Did the last tick find fault with a sensor?
   bool blames_a_sensor() const {
@@ -89,7 +101,7 @@ class TickChecks {
 
   void check_rates(Eigen::Index j) {
     const double qd = last_[j], fastest = robot_.qd_max()[j];
-    const double step = robot_.qdd_max()[j] * controller_.config().period;
+    const double step = robot_.qdd_max()[j] * step_;
     if (std::abs(qd) > fastest + kTolerance)
       problem_ << "joint " << j << " at " << qd << ", at most " << fastest << " is allowed; ";
     if (std::abs(qd - before_[j]) > step + kTolerance)
@@ -105,7 +117,8 @@ class TickChecks {
     const double sign = qd > 0.0 ? 1.0 : -1.0;
     const double room = sign > 0.0 ? robot_.q_max()[j] - q : q - robot_.q_min()[j];
     if (room < 0.0) ++counts_.outside;
-    const bool brakes = sign * (qd - before_[j]) <= -step + kTolerance;
+    const double most = robot_.qdd_max()[j] * step_;
+    const bool brakes = sign * (qd - before_[j]) <= -most + kTolerance;
     const double ticks = std::floor(std::abs(qd) / step) + 1.0;
     const double way = dt * ticks * (std::abs(qd) - 0.5 * step * (ticks - 1.0));
     if (std::abs(qd) > kTolerance && !brakes && way > std::max(room, 0.0) + kTolerance) {
@@ -132,7 +145,12 @@ class TickChecks {
     // Slowed down, the limits are tighter, and leave the less choice.
     double least = 0.0;
     for (const double scale : {1.0, controller_.config().monitor.degraded_scale}) {
-      const Admissible box = admissible(limits, q, before_, controller_.config().period, scale);
+      Admissible box = admissible(limits, q, before_, controller_.config().period, scale);
+      for (Eigen::Index j = 0; j < row.size(); ++j) {  // as much change as the time allows
+        const double change = robot_.qdd_max()[j] * step_;
+        box.low[j] = std::clamp(box.steady_low[j], before_[j] - change, before_[j] + change);
+        box.high[j] = std::clamp(box.steady_high[j], before_[j] - change, before_[j] + change);
+      }
       double best = 0.0;  // as fast outward as the box allows at all
       for (Eigen::Index j = 0; j < row.size(); ++j)
         best += row[j] * (row[j] > 0.0 ? box.high[j] : box.low[j]);
@@ -174,6 +192,7 @@ class TickChecks {
   const Robot& robot_;
   Posture posture_;
   JointVector last_, before_;
+  double time_ = std::numeric_limits<double>::quiet_NaN(), step_ = 0.0;
   double d_min_ = 0.0;
   TickCounts counts_;
   std::ostringstream problem_;

@@ -62,3 +62,17 @@ def test_other_tasks_or_values_out_of_bounds_change_nothing(robot: px.Robot) -> 
         with pytest.raises(px.ConfigError, match=told):
             law.retune(tasks)
     assert law.config.tasks[0].d_min == 0.1
+
+
+def test_the_pairs_that_self_collision_watches_stay(robot: px.Robot) -> None:
+    def tasks(**values: object) -> list[object]:
+        return [px.Avoidance(), px.SelfCollision(**values), px.Reach()]
+
+    law = px.Controller(
+        robot, px.Skin([], px.SensorModel()), px.ControllerConfig(tasks=tasks(d_min=0.05))
+    )
+    law.retune(tasks(d_min=0.06))
+    assert law.config.tasks[1].d_min == 0.06
+    with pytest.raises(px.ConfigError, match=r"self_collision\.pairs: are chosen at set-up"):
+        law.retune(tasks(d_min=0.07, pairs=[("forearm_link", "base_link")]))
+    assert law.config.tasks[1].d_min == 0.06

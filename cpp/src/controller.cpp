@@ -162,8 +162,21 @@ struct Controller::Impl {
     return reach;
   }
 
+  /// Is it acceleration alone that avoidance is short of, as after a HOLD that has cleared? Then
+  /// the position and velocity limits let the row have its share once there was time.
+  bool in_time(std::size_t level, Eigen::Index row, const Admissible& box) const {
+    Admissible steady = box;
+    steady.low = box.steady_low;
+    steady.high = box.steady_high;
+    JointVector qd = out.qd;
+    command({solution.rho.data(), static_cast<std::size_t>(solution.levels) + 1},
+            std::span<const Task>(stack.data(), config.tasks.size()), qd_last, steady, qd);
+    return !(residual(stack[level], qd)[row] > kExecuted * stack[level].rate[row]);
+  }
+
   /// Was avoidance asked for more than the command gives?
-  void judge() {
+  /// @param cut_back  the command was cut back for what is not seen: more time would not help
+  void judge(const Admissible& box, bool cut_back) {
     for (std::size_t level = 0; level < config.tasks.size(); ++level) {
       if (!std::holds_alternative<Avoidance>(config.tasks[level])) continue;
       const Task& task = stack[level];
@@ -175,7 +188,7 @@ struct Controller::Impl {
           // Outside d_min the goal may well hold against it: there the arm may come to rest.
           // The baseline moves another point than the pair's, and is left as it is published.
           const bool whole_body = config.control_point == ControlPoint::kWholeBody;
-          stuck(whole_body && caution.inside(out));
+          stuck(whole_body && caution.inside(out) && (cut_back || !in_time(level, row, box)));
           return;
         }
       }
@@ -191,6 +204,17 @@ struct Controller::Impl {
     } else if (clock.now() - stuck_since > config.monitor.stuck_after) {
       note(Reason::kAvoidanceStuck, out.control.link);
     }
+  }
+
+  /// The limits of a nominal period, with no more change of velocity than the time since the last
+  /// command allows: a tick may come early. Braking in time stays possible: until the next command
+  /// the joint moves at this one for a nominal period at most.
+  Admissible admissible_now(const JointVector& q, double scale) const {
+    Admissible box = admissible(limits, q, qd_last, config.period, scale);
+    const JointVector change = clock.step() * limits.qdd_max;
+    box.low = box.steady_low.cwiseMax(qd_last - change).cwiseMin(qd_last + change);
+    box.high = box.steady_high.cwiseMax(qd_last - change).cwiseMin(qd_last + change);
+    return box;
   }
 
   /// What each task wanted, and what is missing of it in the command that is issued.
@@ -230,14 +254,16 @@ struct Controller::Impl {
     solve(tasks, robot->n_q(), limits.qd_max, config.solver, solution);
     // By the last tick's mode: this one's findings are not complete yet.
     const double scale = monitor.slowed() ? config.monitor.degraded_scale : 1.0;
-    const Admissible box = admissible(limits, q, qd_last, config.period, scale);
+    const Admissible box = admissible_now(q, scale);
     command({solution.rho.data(), static_cast<std::size_t>(solution.levels) + 1}, tasks, qd_last,
             box, out.qd);
     // What is known to be there has the last word over what may be where nothing is seen.
+    const JointVector solved = out.qd;
     if (sensed) caution.slow_into_unseen(clock.now(), posture, perception, box, out, monitor);
+    const bool cut_back = (out.qd.array() != solved.array()).any();
     caution.keep_off(posture, box, out);
     out.timings.solve_us = watch.lap_us();
-    judge();
+    judge(box, cut_back);
     if ((q.array() < limits.q_min.array() || q.array() > limits.q_max.array()).any())
       note(Reason::kOutsideLimits);
   }
@@ -256,7 +282,7 @@ struct Controller::Impl {
     out.mode = monitor.conclude();
     if (!usable || out.mode >= Mode::kHold) {
       const JointVector& at = usable ? q : posture.q;  // the last posture that could be trusted
-      const Admissible box = admissible(limits, at, qd_last, config.period, 1.0);
+      const Admissible box = admissible_now(at, 1.0);
       decelerate(qd_last, box, out.qd);
       if (usable) caution.keep_off(posture, box, out);
     }
@@ -375,6 +401,11 @@ void Controller::retune(const std::vector<TaskSpec>& tasks) {
       names += std::string(names.empty() ? "" : ", ") + task_name(task);
     throw ConfigError("tasks: other values are taken for the same tasks in the same order: " +
                       names);
+  }
+  for (std::size_t level = 0; level < tasks.size(); ++level) {
+    const auto* to = std::get_if<SelfCollision>(&tasks[level]);
+    if (to != nullptr && to->pairs != std::get<SelfCollision>(mine[level]).pairs)
+      throw ConfigError("self_collision.pairs: are chosen at set-up; the other values may change");
   }
   ControllerConfig changed = impl_->config;
   changed.tasks = tasks;

@@ -355,6 +355,35 @@ TEST(Controller, InsideTheLeastDistanceNothingComesNearer) {
   EXPECT_GT(inside, 300);
 }
 
+TEST(Controller, AHoldInsideTheLeastDistanceClearsAndTheArmMovesOff) {
+  const auto robot = test::arm();
+  Controller controller(robot, Skin{}, ControllerConfig{});
+  JointVector q = bent();
+  Posture posture = robot->make_posture();
+  robot->update(q, posture);
+  const Pose goal = posture.T_WT;
+  Pose bad = goal;
+  bad.translation().x() = std::nan("");
+  Points near(1, 3);
+  near.row(0) = (goal.translation() + Vector3(0.15, 0.0, 0.0)).transpose();
+  double before = 0.0, after = 0.0;
+  for (int i = 0; i < 200; ++i) {
+    const TickOutput& out = controller.tick_known(0.01 * i, q, near, i < 30 ? bad : goal);
+    if (i < 30) {
+      ASSERT_EQ(out.mode, Mode::kHold);
+    } else if (i == 30) {
+      before = out.pair_distance();
+      ASSERT_LT(before, 0.2);
+    }
+    after = out.pair_distance();
+    if (i > 45) {
+      ASSERT_EQ(out.mode, Mode::kRun);
+    }
+    q += 0.01 * out.qd;
+  }
+  EXPECT_GT(after, before + 0.02);
+}
+
 TEST(Controller, AnObstacleThatTouchesIsNotTakenForBody) {
   const auto robot = test::arm();
   Controller controller(robot, test::looking_back(), ControllerConfig{});
@@ -561,6 +590,66 @@ TEST(Controller, AClockThatJumpsAnHourChangesNoCommand) {
   };
   EXPECT_LT((run(3600.0) - run(0.0)).norm(), 1e-6);
   EXPECT_LT((run(-3600.0) - run(0.0)).norm(), 1e-6);
+}
+
+TEST(Controller, TicksThatComeEarlyAccelerateByTheTimeThatHasPassed) {
+  const auto robot = test::arm();
+  Controller controller(robot, test::ring(), five_tasks());
+  Random random(18);
+  JointVector q = bent(), last = JointVector::Zero(6);
+  const Pose goal = goal_near(*robot, q);
+  double time = 0.0;
+  bool limited = false;  // somewhere the limit was what held a joint
+  for (int i = 0; i < 3000; ++i) {
+    const double step = i % 3 == 0 ? 0.01 : random.uniform(0.0005, 0.0125);
+    time += step;
+    q += step * last;
+    const auto batch =
+        i % 7 == 0 ? scans(random, 10, static_cast<std::uint32_t>(i), time) : std::vector<Scan>{};
+    const TickOutput& out = controller.tick(time, q, batch, goal);
+    const JointVector most = std::min(step, 0.01) * robot->qdd_max();
+    const JointVector change = (out.qd - last).cwiseAbs();
+    ASSERT_TRUE((change.array() <= most.array() + 1e-12).all());
+    limited = limited || (step < 0.009 && (change - most).cwiseAbs().minCoeff() < 1e-9);
+    last = out.qd;
+  }
+  EXPECT_TRUE(limited);
+}
+
+TEST(Controller, AJointThatTicksAtAnyTimeStillStopsAtItsLimit) {
+  const auto robot = test::arm();
+  Random random(19);
+  for (int arm = 0; arm < 10; ++arm) {
+    Controller controller(robot, Skin{}, ControllerConfig{});
+    JointVector q = bent(), last = JointVector::Zero(6);
+    Pose goal = goal_near(*robot, q);
+    double time = 0.0;
+    for (int i = 0; i < 1500; ++i) {
+      if (i % 100 == 0) goal = goal_near(*robot, test::posture(random, 6));
+      const double step = random.uniform(0.0005, 0.01);
+      time += step;
+      q += step * last;
+      last = controller.tick_known(time, q, Points(0, 3), goal).qd;
+      ASSERT_TRUE((q.array() <= robot->q_max().array() + 1e-9).all());
+      ASSERT_TRUE((q.array() >= robot->q_min().array() - 1e-9).all());
+    }
+  }
+}
+
+TEST(Controller, AClockThatCrawlsStillBrakes) {
+  const auto robot = test::arm();
+  Controller controller(robot, Skin{}, ControllerConfig{});
+  JointVector q = bent();
+  const Pose goal = goal_near(*robot, q);
+  for (int i = 0; i < 20; ++i)
+    q += 0.01 * controller.tick_known(0.01 * i, q, Points(0, 3), goal).qd;
+  ASSERT_GT(controller.tick_known(0.2, q, Points(0, 3), goal).qd.norm(), 1e-3);
+  JointVector bad = q;
+  bad[0] = std::nan("");
+  JointVector qd;
+  for (int i = 1; i < 5000; ++i)
+    qd = controller.tick_known(0.2 + 1e-9 * i, bad, Points(0, 3), goal).qd;
+  EXPECT_EQ(qd.norm(), 0.0);
 }
 
 TEST(Controller, WhatNoZoneTellsIsUnknownNotFree) {

@@ -19,7 +19,7 @@ import rclpy
 from numpy.typing import NDArray
 from proxcgal_msgs.msg import Proximity, SensorArray
 from proxcgal_ros import topics
-from proxcgal_ros.convert import header, joint_message, scan_messages
+from proxcgal_ros.convert import header, joint_message, nanoseconds, scan_messages
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
@@ -49,7 +49,8 @@ class Bench(Node):
         self._arrays = topics.arrays([mount.name for mount in self.setup.skin.mounts])
         self._random = np.random.default_rng(0)
         self._counter = 0
-        self.commands: list[float] = []
+        self.commands: list[float] = []  # [s] of receipt
+        self.stamps: list[int] = []  # of the joint state of each
         self.mode = -1
         self._joints = self.create_publisher(JointState, topics.JOINT_STATES, topics.RELIABLE_QOS)
         self._scans = {
@@ -64,22 +65,38 @@ class Bench(Node):
 
     def _hear(self, message: Proximity) -> None:
         self.mode = message.mode
+        self.stamps.append(nanoseconds(message.header.stamp))
 
-    def heard(self, until: float) -> float | None:
-        """Listens without a pause, until a command has come or it is that late."""
-        self.commands.clear()
-        while not self.commands and time.monotonic() < until:
+    def listen(self, until: float) -> None:
+        """Without a pause: each message's time of receipt is noted."""
+        while time.monotonic() < until:
             self._executor.spin_once(timeout_sec=0.0)
-        return self.commands[0] if self.commands else None
+
+    def answer(self, stamp: int, since: float, until: float) -> float | None:
+        """When the first command came that a joint state of this stamp brought, after `since`.
+
+        A command's proximity follows it, in the same order, and has the joint state's stamp.
+        """
+        while time.monotonic() < until:
+            self._executor.spin_once(timeout_sec=0.0)
+            for command, told in zip(self.commands, self.stamps, strict=False):
+                if told == stamp and command > since:
+                    return command
+        return None
+
+    def forget(self) -> None:
+        """What has been told until now."""
+        told = min(len(self.commands), len(self.stamps))
+        del self.commands[:told], self.stamps[:told]
 
     def _now(self) -> int:
         return int(self.get_clock().now().nanoseconds)
 
-    def send_joints(self) -> None:
-        q = self.setup.q0
-        self._joints.publish(
-            joint_message(self._names, q, np.zeros_like(q), header(self._now(), ""))
-        )
+    def send_joints(self) -> int:
+        """Its stamp."""
+        q, stamp = self.setup.q0, self._now()
+        self._joints.publish(joint_message(self._names, q, np.zeros_like(q), header(stamp, "")))
+        return stamp
 
     def made(self) -> dict[str, SensorArray]:
         """Every zone of every sensor sees something, 0.6 to 1.2 m away: a full cloud."""
@@ -110,7 +127,7 @@ def main() -> None:
     try:
         rclpy.init()
         bench = Bench()
-        together, alone, apart, waits = measure(bench, seconds)
+        together, alone, apart = measure(bench, seconds)
     finally:
         child.terminate()
         child.wait(10.0)
@@ -118,52 +135,57 @@ def main() -> None:
     print(f"{'':52}{'median':>8}{'90 %':>8}{'99 %':>8}{'worst':>8}  [ms]")
     show("joint state -> command, no scans in between", alone)
     show("scans -> command, in the robot's cycle (1920 zones)", together)
-    show("scans -> command, at any time in the cycle", apart)
-    show("  of which waiting for the next joint state", waits)
+    show("an array's scans -> command, at any time in between", apart)
     sys.stdout.flush()
     os._exit(0)  # nothing is left to put away
 
 
 def measure(bench: Bench, seconds: float) -> tuple[list[float], ...]:
-    """Delays [s]: scans in the cycle, joint states alone, scans at any time, their wait."""
+    """Delays [s]: all arrays' scans in the cycle, joint states alone, one array's in between."""
     random = np.random.default_rng(1)
     together: list[float] = []
     alone: list[float] = []
     apart: list[float] = []
-    waits: list[float] = []
     due, cycle, ready = time.monotonic(), 0, 0
     end = due + 30.0
+    loose: dict[str, SensorArray] = {}  # of a beat: told one by one, in cycles of their own
     while time.monotonic() < end:
         due += 1.0 / HZ
         cycle += 1
         beat = cycle % SENSOR_EVERY == 0
-        loose = beat and (cycle // SENSOR_EVERY) % 2 == 0
         made = bench.made() if beat else {}
-        sent = None
-        if loose:  # at any time before the joint state
-            sleep_until(due - random.uniform(0.0, 1.0) / HZ)
-            sent = time.monotonic()
-            bench.send_scans(made)
+        if beat and (cycle // SENSOR_EVERY) % 2 == 0:
+            loose, made = made, {}
         sleep_until(due)
-        bench.heard(0.0)
-        joints = time.monotonic()
-        if beat and not loose:
-            bench.send_scans(made)
-        bench.send_joints()
-        came = bench.heard(due + 0.8 / HZ)
-        if bench.mode != 0 or came is None:
+        bench.listen(0.0)
+        bench.forget()
+        begun = time.monotonic()
+        bench.send_scans(made)
+        stamp = bench.send_joints()
+        came = bench.answer(stamp, begun, due + 0.9 / HZ)
+        if bench.mode == 0 and came is not None:
+            ready += 1
+            if ready == 100:  # warm
+                end = time.monotonic() + seconds
+            if ready > 100:
+                (together if made else alone).append(came - begun)
+        if not loose or came is None:
             continue
-        ready += 1
-        if ready == 100:  # warm
-            end = time.monotonic() + seconds
-        if ready <= 100:
-            continue
-        if sent is not None:
+        # At any time until the next joint state, which may come before the answer and bring it.
+        name = min(loose)
+        one = {name: loose.pop(name)}
+        bench.listen(due + random.uniform(0.0, 1.0) / HZ)
+        sent = time.monotonic()
+        bench.send_scans(one)
+        came = bench.answer(stamp, sent, due + 1.0 / HZ)
+        if came is None:
+            due += 1.0 / HZ
+            cycle += 1
+            stamp = bench.send_joints()
+            came = bench.answer(stamp, sent, due + 0.9 / HZ)
+        if came is not None and bench.mode == 0 and ready > 100:
             apart.append(came - sent)
-            waits.append(joints - sent)
-        else:
-            (together if beat else alone).append(came - joints)
-    return together, alone, apart, waits
+    return together, alone, apart
 
 
 def sleep_until(due: float) -> None:

@@ -7,6 +7,7 @@ from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -18,13 +19,15 @@ def generate_launch_description() -> LaunchDescription:
                 "scenario", default_value="front_plane", description="name or path of a scenario"
             ),
             DeclareLaunchArgument(
-                "controller", default_value="wb", description="wb (whole body) or sm (sensors)"
+                "controller",
+                default_value="wb",
+                choices=["wb", "sm", "wb_memory"],
+                description="whole body, sensors only, or whole body with a memory",
             ),
             Node(
                 package="proxcgal_ros",
                 executable="proxcgal_ros",
-                name="proxcgal_robot",
-                arguments=["sim", scenario],
+                arguments=["sim", scenario],  # two nodes: neither is given a name
                 output="screen",
             ),
             Node(
@@ -33,7 +36,11 @@ def generate_launch_description() -> LaunchDescription:
                 name="proxcgal",
                 arguments=["node"],
                 parameters=[
-                    {"scenario": scenario, "controller": LaunchConfiguration("controller")}
+                    {
+                        # Texts, whatever YAML would make of them.
+                        name: ParameterValue(LaunchConfiguration(name), value_type=str)
+                        for name in ("scenario", "controller")
+                    }
                 ],
                 output="screen",
             ),

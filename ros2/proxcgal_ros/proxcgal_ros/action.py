@@ -76,7 +76,14 @@ class MoveRobotAction:
             for reason in reasons:
                 self._node.get_logger().warning(f"goal refused: {reason}")
             now = self._node.get_clock().now().nanoseconds
-            self._refused.publish(GoalRefused(header=header(now, ""), reasons=reasons))
+            self._refused.publish(
+                GoalRefused(
+                    header=header(now, ""),
+                    reasons=reasons,
+                    frame=request.frame,
+                    translation=place,
+                )
+            )
             return GoalResponse.REJECT
         return GoalResponse.ACCEPT
 

@@ -89,6 +89,13 @@ def joint_positions(message: JointState, names: Sequence[str]) -> Array | None:
     return np.array([place[name] for name in names], np.float64)
 
 
+def joint_velocities(message: JointState, names: Sequence[str], fastest: Array) -> Array:
+    """(n_q,) in the order of `names`, at most `fastest`; 0 where none is told, or no number."""
+    told = dict(zip(message.name, message.velocity, strict=False))
+    v = np.array([told.get(name, 0.0) for name in names], np.float64)
+    return np.where(np.isfinite(v), np.clip(v, -fastest, fastest), 0.0)
+
+
 def scan_messages(
     scans: Sequence[_core.Scan], arrays: dict[str, list[int]], stamps_ns: Sequence[int]
 ) -> dict[str, list[SensorScan]]:

@@ -18,7 +18,9 @@ from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
 from proxcgal.errors import ConfigError
+from proxcgal.models import check_mounts
 from proxcgal.sim.loop import run_ticks
+from proxcgal.sim.mounting import SCANS
 from proxcgal.sim.recorder import Recorder, Settings
 from proxcgal.sim.scenario import CONTROLLERS, change_scenario, load_scenario
 from proxcgal.sim.setup import Setup
@@ -92,6 +94,11 @@ class ControllerNode(Node):
         self._action = MoveRobotAction(self, self.goals)
         if parameters.fixed_switch(self, "reset_service", "offer ~/reset, which leaves a STOP"):
             self.create_service(Trigger, "~/reset", self._reset)
+        self._look = parameters.fixed_switch(
+            self, "check_mounts",
+            "compare what sensors see of the arm itself with their mounts, standing still, before "
+            "the first command; wrong ones end the node",
+        )  # fmt: skip
         record = parameters.fixed_text(self, "record", "", "MCAP file for every tick; empty: none")
         self._recorder = Recorder(Path(record)) if record else None
         parameters.on_change(self, self._change)
@@ -101,7 +108,12 @@ class ControllerNode(Node):
         )
 
     def run(self) -> None:
-        """Tick after tick until the node is to end; then the arm is told to rest."""
+        """Tick after tick until the node is to end; then the arm is told to rest.
+
+        Raises: ConfigError: sensors that do not sit where the skin says, before any tick.
+        """
+        if self._look:
+            self._require_mounts()
         if self._recorder is not None:
             self._recorder.start(
                 Settings(
@@ -125,6 +137,21 @@ class ControllerNode(Node):
             self._action.poll()
             if self._recorder is not None:
                 self._recorder.close()
+
+    def _require_mounts(self) -> None:
+        q, scans = self.source.standing(SCANS)
+        if q is None:
+            return
+        checks = check_mounts(self.setup.robot, self.setup.skin, q, scans)
+        if not checks:
+            raise ConfigError(
+                "\n".join(f"skin: {check}" for check in checks.wrong)
+                + "\nsensors do not sit where the skin says, by what they see of the arm itself; "
+                "mend their mounts, or leave the check out with check_mounts:=false"
+            )
+        self.get_logger().info(
+            f"mounts: {checks.judged} of {len(checks.sensors)} sensors could be judged, none wrong"
+        )
 
     def _show(self, given: TickInput, result: TickResult) -> None:
         """After the command has gone out: what others look at."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from rcl_interfaces.msg import (
     FloatingPointRange,
@@ -11,7 +13,7 @@ from rcl_interfaces.msg import (
     ParameterType,
     SetParametersResult,
 )
-from rclpy.exceptions import InvalidParameterValueException
+from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -51,12 +53,36 @@ RULES: dict[str, tuple[float, Number]] = {
 }
 
 
+#: Of parameters, as people write them.
+_KINDS = {
+    ParameterType.PARAMETER_STRING: "a text",
+    ParameterType.PARAMETER_STRING_ARRAY: "a list of texts",
+    ParameterType.PARAMETER_BOOL: "true or false",
+    ParameterType.PARAMETER_DOUBLE: "a number with a point, such as 0.2",
+}
+
+
+def _declared(node: Node, name: str, default: Any, kind: ParameterDescriptor) -> Any:
+    """Declares it, and gives its value. Raises: ConfigError, with what is allowed."""
+    try:
+        return node.declare_parameter(name, default, kind).value
+    except (InvalidParameterTypeException, InvalidParameterValueException) as error:
+        told = re.search(r" to '(.*?)' of type|value \((.*?)\) for", str(error), re.DOTALL)
+        value = next(filter(None, told.groups()), "") if told else str(error)
+        allowed = _KINDS[kind.type]
+        for span in kind.floating_point_range:
+            allowed += f", from {span.from_value:g} to {span.to_value:g}"
+        raise ConfigError(
+            f"parameter {name} = {value}: must be {allowed} ({kind.description})"
+        ) from None
+
+
 def fixed_text(node: Node, name: str, default: str, description: str) -> str:
     """Declares a parameter that only a launch can set, and gives its value."""
     kind = ParameterDescriptor(
         type=ParameterType.PARAMETER_STRING, description=description, read_only=True
     )
-    return str(node.declare_parameter(name, default, kind).value)
+    return str(_declared(node, name, default, kind))
 
 
 def fixed_texts(node: Node, name: str, description: str) -> list[str]:
@@ -64,7 +90,7 @@ def fixed_texts(node: Node, name: str, description: str) -> list[str]:
     kind = ParameterDescriptor(
         type=ParameterType.PARAMETER_STRING_ARRAY, description=description, read_only=True
     )
-    value = node.declare_parameter(name, Parameter.Type.STRING_ARRAY, kind).value
+    value = _declared(node, name, Parameter.Type.STRING_ARRAY, kind)
     return [str(text) for text in value or []]
 
 
@@ -73,7 +99,7 @@ def fixed_switch(node: Node, name: str, description: str) -> bool:
     kind = ParameterDescriptor(
         type=ParameterType.PARAMETER_BOOL, description=description, read_only=True
     )
-    return bool(node.declare_parameter(name, False, kind).value)
+    return bool(_declared(node, name, False, kind))
 
 
 def declare_numbers(node: Node, values: Mapping[str, float]) -> dict[str, float]:
@@ -98,13 +124,7 @@ def declare_numbers(node: Node, values: Mapping[str, float]) -> dict[str, float]
                 FloatingPointRange(from_value=number.low, to_value=number.high, step=0.0)
             ],
         )  # fmt: skip
-        try:
-            found[name] = float(node.declare_parameter(name, default, kind).value)
-        except InvalidParameterValueException as error:
-            raise ConfigError(
-                f"parameter {name} = {error.args[1] if len(error.args) > 1 else error}: must be "
-                f"from {number.low:g} to {number.high:g} ({number.description})"
-            ) from None
+        found[name] = float(_declared(node, name, default, kind))
     return found
 
 
@@ -115,7 +135,7 @@ def declare_second_goal(node: Node) -> str:
         description="what a goal does while another is pursued",
         additional_constraints=f"one of {', '.join(SECOND_GOAL)}",
     )
-    value = str(node.declare_parameter("second_goal", SECOND_GOAL[0], kind).value)
+    value = str(_declared(node, "second_goal", SECOND_GOAL[0], kind))
     if value not in SECOND_GOAL:
         raise ConfigError(f"parameter second_goal = {value!r}: one of {', '.join(SECOND_GOAL)}")
     return value

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable
 
 import numpy as np
@@ -18,7 +18,13 @@ from proxcgal.sim.setup import Setup
 from proxcgal.sim.ticks import TickInput
 from proxcgal_ros import topics
 from proxcgal_ros.clocks import Clocks
-from proxcgal_ros.convert import command_message, joint_positions, nanoseconds, scans_of
+from proxcgal_ros.convert import (
+    command_message,
+    joint_positions,
+    joint_velocities,
+    nanoseconds,
+    scans_of,
+)
 from proxcgal_ros.live_goals import LiveGoals
 from proxcgal_ros.restarts import Restarts
 
@@ -28,13 +34,20 @@ JITTER = 0.25  # of a period: a joint state may come that much early and still m
 OVERDUE = 1.5  # periods without a joint state, after which the watchdog makes the tick
 STEADY = 10  # joint states in a row that were not stale, before the first tick
 BACKLOG = 50  # events that are looked through for one
+SOON = 0.15  # of a period, on both sides: scans wait for a joint state that is expected then
+EARLY_TICKS = 2  # for each array between two joint states; more scans wait for the next one
+STILL = 1e-4  # [rad] or [m] of any joint
+PATIENCE = 5.0  # [s]
 KEPT_SCANS = 4  # of each sensor between two ticks; more are an attack or a fault
 
 
 class RosSource:
     """Every joint state makes a tick, at the controller's rate; commands go out at once.
 
-    Where no joint state comes the watchdog makes the ticks, so that the monitor finds it stale.
+    Scans that come between two joint states make a tick too, with the last joint state carried on
+    by its own velocity: what they see is acted on before the next one. Its stamp stays that of the
+    measurement, and the controller lets velocities change by the time that has passed. Where no
+    joint state comes the watchdog makes the ticks, so that the monitor finds it stale.
     """
 
     def __init__(
@@ -58,7 +71,10 @@ class RosSource:
         self._scans: deque[_core.Scan] = deque(maxlen=KEPT_SCANS * max(len(setup.skin), 1))
         self._restarts = Restarts(setup.scenario.controller.monitor.hold_after)
         self._q: Array | None = None
+        self._v: Array = np.zeros(len(self._names))  # measured, as far as it is told
+        self._fastest = np.asarray(setup.robot.qd_max)
         self._q_stamp = -np.inf
+        self._received = -np.inf
         self._steady = 0
         self._stale = setup.scenario.controller.monitor.joints_hold_after
         self.q_stamp_ns = 0  #: of the last joint state, ROS time
@@ -66,14 +82,20 @@ class RosSource:
         self.scan_stamps_ns: dict[str, int] = {}
         self.qd: Array = np.zeros(len(self._names))  #: last command
         self._newest_ns: dict[str, int] = {}
-        self._fresh = False  # a joint state that no tick has been given
+        self._fresh = False  # a joint state that no tick of its own has been given
+        self._seen = False  # scans that no tick has been given
+        self._early = 0  # ticks since the last joint state's
+        self._late = False  # was that one?
         self._due = -np.inf
-        self._last = -np.inf
+        self._last = -np.inf  # tick of a joint state or of the watchdog
         self._warned = False
         node.create_subscription(
             JointState, topics.JOINT_STATES, self._take_joints, topics.NEWEST_QOS
         )
-        for name, rows in topics.arrays([mount.name for mount in setup.skin.mounts]).items():
+        arrays = topics.arrays([mount.name for mount in setup.skin.mounts])
+        self._sensors = len(setup.skin)
+        self._most_early = EARLY_TICKS * len(arrays)
+        for name, rows in arrays.items():
             node.create_subscription(
                 SensorArray, topics.scan_topic(name), self._taker(name, rows), topics.SENSOR_QOS
             )
@@ -86,15 +108,43 @@ class RosSource:
     def read(self) -> TickInput | None:
         """The next tick's inputs, as soon as it is due; None once the node is to end."""
         while self._running():
-            self._executor.spin_once(timeout_sec=0.1)
+            self._executor.spin_once(timeout_sec=SOON * self._period if self._seen else 0.1)
             if self._q is None or self._steady < STEADY:
                 continue
             if self._overdue:
                 self._catch_up()
-            now = self._clocks.now()
-            if (self._fresh and now >= self._due - JITTER * self._period) or self._overdue:
-                return self._input(now)
+            if self._due_now():
+                return self._input(self._clocks.now())
+            if self._seen and self._may_be_early():
+                return self._between()
         return None
+
+    def standing(self, count: int) -> tuple[Array | None, list[_core.Scan]]:
+        """Where the arm stands (n_q,), before the first tick, and scans from there.
+
+        Args:
+            count: of each sensor; of those that tell less in `PATIENCE`, what there is.
+
+        Returns:
+            None and none where the node is to end.
+        """
+        q: Array | None = None
+        kept: list[_core.Scan] = []
+        while self._running():
+            self._executor.spin_once(timeout_sec=0.1)
+            if self._q is None:
+                continue
+            if q is None or np.abs(self._q - q).max() > STILL:
+                q, kept, end = self._q, [], self._clocks.now() + PATIENCE
+            else:
+                kept += self._scans
+            self._scans.clear()
+            told = Counter(scan.sensor for scan in kept)
+            enough = all(told[row] >= count for row in range(self._sensors))
+            if enough or self._clocks.now() > end:
+                self._steady, self._seen = 0, False
+                return q, kept
+        return None, []
 
     def command(self, qd: Array) -> None:
         """Joint velocities (n_q,) until the next tick."""
@@ -105,15 +155,43 @@ class RosSource:
         """The last command: at rest."""
         self.command(np.zeros(len(self._names)))
 
+    def _due_now(self) -> bool:
+        early = self._clocks.now() < self._due - JITTER * self._period
+        return self._overdue or (self._fresh and not early)
+
     def _input(self, now: float) -> TickInput:
+        """Of a joint state's tick, or the watchdog's."""
         assert self._q is not None
-        late = self._last > -np.inf and now - self._last > 2.0 * self._period and self._fresh
+        self._late = now - self._last > 2.0 * self._period and self._fresh and self._last > -np.inf
         self._due = max(self._due + self._period, now + (1.0 - JITTER) * self._period)
-        self._last, self._fresh, self._overdue = now, False, False
+        self._last, self._fresh, self._overdue, self._early = now, False, False, 0
+        return self._given(now, self._q)
+
+    def _may_be_early(self) -> bool:
+        """Not where joint states stay away, and not where they were late: those are counted."""
+        now = self._clocks.now()
+        fresh = now - self._q_stamp < OVERDUE * self._period
+        soon = abs(self._received + self._period - now) < SOON * self._period
+        return fresh and not soon and not self._late and self._early < self._most_early
+
+    def _between(self) -> TickInput:
+        """Of a tick between joint states; scans that are here already go with it."""
+        for _ in range(self._most_early):
+            self._executor.spin_once(timeout_sec=0.0)
+            if self._due_now():
+                return self._input(self._clocks.now())
+        now = self._clocks.now()
+        assert self._q is not None
+        self._early += 1
+        ahead = min(max(now - self._q_stamp, 0.0), OVERDUE * self._period)
+        return self._given(now, self._q + ahead * self._v)
+
+    def _given(self, now: float, q: Array) -> TickInput:
         scans, self._scans = tuple(self._scans), deque(maxlen=self._scans.maxlen)
         self.scan_stamps_ns = dict(self._newest_ns)
-        goal = self._goals.at(now, self._q)
-        return TickInput(now, self._q, goal, scans, late=late, q_stamp=self._q_stamp)
+        self._seen = False
+        goal = self._goals.at(now, q)
+        return TickInput(now, q, goal, scans, late=self._late, q_stamp=self._q_stamp)
 
     def _take_joints(self, message: JointState) -> None:
         q = joint_positions(message, self._names)
@@ -127,9 +205,11 @@ class RosSource:
             return
         self.q_stamp_ns = nanoseconds(message.header.stamp) or self._clocks.now_ns()
         stamp = self._clocks.carried(self.q_stamp_ns)
+        self._received = self._clocks.now()
         if self._steady < STEADY:  # while a driver starts nothing is latched
             self._steady = self._steady + 1 if stamp - self._q_stamp < self._stale else 0
         self._q, self._q_stamp = q, stamp
+        self._v = joint_velocities(message, self._names, self._fastest)
         self._fresh = True
 
     def _taker(self, name: str, rows: list[int]) -> Callable[[SensorArray], None]:
@@ -138,6 +218,7 @@ class RosSource:
             self._scans.extend(scans_of(message, rows, self._clocks.carried, now, self._restarts))
             stamps = [nanoseconds(scan.stamp) for scan in message.scans[: len(rows)]]
             self._newest_ns[name] = max([self._newest_ns.get(name, 0), *stamps])
+            self._seen = True
 
         return take
 

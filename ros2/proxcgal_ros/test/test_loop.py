@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from proxcgal_msgs.msg import Proximity
 
 from conftest import PATIENT, Client, Processes, goal
+from proxcgal.sim.recording import read_recording
 from proxcgal.sim.scenario import load_scenario
 from proxcgal.sim.setup import Setup
 from proxcgal.sim.trial import run_trial
@@ -27,7 +29,10 @@ def over_ros(
     """The scene's summary, its goal sent as one of MoveRobot."""
     out = folder / f"{controller}.json"
     node, sim = f"node_{controller}", f"sim_{controller}"
-    processes.start(node, "node", *PATIENT, "-p", f"controller:={controller}")
+    record = folder / f"{controller}.mcap"
+    processes.start(
+        node, "node", *PATIENT, "-p", f"controller:={controller}", "-p", f"record:={record}"
+    )
     arm = processes.start(sim, "sim", SCENE, "--out", str(out))
     heard = client.listen(Proximity, "proximity")
     heard.clear()
@@ -56,3 +61,26 @@ def test_front_plane_over_ros_keeps_the_gain_of_the_direct_loop(
     print(f"gain: direct {gains[0]:.1f} mm, over ROS 2 {gains[1]:.1f} mm")
     print({name: told["true_min_m"] for name, told in ros.items()})
     assert gains[1] == pytest.approx(gains[0], abs=20.0)
+
+    # Scans that came between two joint states made a tick of their own; velocities changed by no
+    # more than the time that had passed allows.
+    ticks = read_recording(tmp_path / "wb.mcap").ticks
+    times = np.array([tick.given.time for tick in ticks])
+    stamps = np.array([tick.given.q_stamp for tick in ticks])
+    early = np.flatnonzero(np.diff(stamps) == 0.0) + 1
+    assert sum(bool(ticks[row].given.scans) for row in early) > 50
+    commands = np.array([tick.result.qd for tick in ticks])
+    passed = np.minimum(np.diff(times), 1.0 / setup.scenario.simulation.control_hz)
+    most = passed[:, None] * np.asarray(setup.robot.qdd_max)
+    assert np.all(np.abs(np.diff(commands, axis=0)) <= most * (1.0 + 1e-5))
+    # The arm, carried on from one joint state, is on its way to where the next one finds it.
+    q = np.array([tick.given.q for tick in ticks])
+    regular = np.setdiff1d(np.arange(len(ticks)), early)
+    way = [
+        np.stack([np.interp(when, stamps[regular], joint) for joint in q[regular].T], axis=1)
+        for when in (times[early], stamps[early])
+    ]
+    missed, moved = (np.abs(way[0] - other).max(axis=1) for other in (q[early], way[1]))
+    moving = moved > 1e-4
+    assert np.count_nonzero(moving) > 20
+    assert np.median(missed[moving]) < 0.3 * np.median(moved[moving])
