@@ -231,8 +231,13 @@ struct Controller::Impl {
     // By the last tick's mode: this one's findings are not complete yet.
     const double scale = monitor.slowed() ? config.monitor.degraded_scale : 1.0;
     const Admissible box = admissible(limits, q, qd_last, config.period, scale);
-    command({solution.rho.data(), static_cast<std::size_t>(solution.levels) + 1}, tasks, qd_last,
-            box, out.qd);
+    const std::span<const JointVector> levels(solution.rho.data(),
+                                              static_cast<std::size_t>(solution.levels) + 1);
+    command(levels, tasks, qd_last, box, out.qd);
+    for (std::size_t level = 0; level < tasks.size(); ++level) {
+      if (!std::holds_alternative<Avoidance>(config.tasks[level])) continue;
+      catch_up(levels, tasks[level], box, out.qd);
+    }
     // What is known to be there has the last word over what may be where nothing is seen.
     if (sensed) caution.slow_into_unseen(clock.now(), posture, perception, box, out, monitor);
     caution.keep_off(posture, box, out);
