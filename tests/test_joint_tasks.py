@@ -176,3 +176,10 @@ def test_a_trapped_run_ends_with_what_holds_it(joint: px.Robot) -> None:
     assert log.true_m[np.isfinite(log.true_m)].min() >= 0.05
     assert log.task_names == scenario.controller.levels
     assert log.task_activation.shape == log.task_residual.shape == (len(log.time), 4)
+
+
+def test_memory_keeps_the_wrist_off_what_only_the_forearm_saw(joint: px.Robot) -> None:
+    # Half a second after it was seen last, slowly, no sensor looks where the wrist goes.
+    scenario = load_scenario("joint_behind", ['perception="sensed"', 'initial=["jl"]'])
+    log = simulate(scenario, "wb_memory", 2, lambda _: None)
+    assert log.summary()["true_min_m"] >= 0.05

@@ -162,6 +162,15 @@ struct Controller::Impl {
     return reach;
   }
 
+  /// The levels from the top that avoid or ask for nothing: below them another task comes first.
+  std::size_t first_of_another_kind() const {
+    std::size_t level = 0;
+    while (level < config.tasks.size() && (std::holds_alternative<Avoidance>(config.tasks[level]) ||
+                                           !(stack[level].activation.array() > 0.0).any()))
+      ++level;
+    return level;
+  }
+
   /// Is it acceleration alone that avoidance is short of, as after a HOLD that has cleared? Then
   /// the position and velocity limits let the row have its share once there was time.
   bool in_time(std::size_t level, Eigen::Index row, const Admissible& box) const {
@@ -255,8 +264,11 @@ struct Controller::Impl {
     // By the last tick's mode: this one's findings are not complete yet.
     const double scale = monitor.slowed() ? config.monitor.degraded_scale : 1.0;
     const Admissible box = admissible_now(q, scale);
-    command({solution.rho.data(), static_cast<std::size_t>(solution.levels) + 1}, tasks, qd_last,
-            box, out.qd);
+    const std::span<const JointVector> levels(solution.rho.data(),
+                                              static_cast<std::size_t>(solution.levels) + 1);
+    command(levels, tasks, qd_last, box, out.qd);
+    for (std::size_t level = first_of_another_kind(); level-- > 0;)
+      catch_up(levels, tasks[level], box, out.qd);
     // What is known to be there has the last word over what may be where nothing is seen.
     const JointVector solved = out.qd;
     if (sensed) caution.slow_into_unseen(clock.now(), posture, perception, box, out, monitor);

@@ -295,6 +295,51 @@ TEST(KeepRate, IsTheNearestVelocityThatKeepsIt) {
   }
 }
 
+TEST(CatchUp, GivesADistanceItsRateThoughAnotherJointIsSlow) {
+  const std::vector<JointVector> levels{vector({0.1, 3.0}), vector({0.1, 3.0})};
+  const Admissible box{vector({-0.1, -0.1}), vector({0.1, 0.1}), vector({-4, -4}), vector({4, 4})};
+  const Task distance = row({1.0, 0.0}, 0.1);
+  JointVector qd;
+  command(levels, {&distance, 1}, vector({0.0, 0.0}), box, qd);
+  EXPECT_NEAR(qd[0], 0.1 / 30.0, 1e-12);  // its share of the way that joint 2 still has to go
+  JointVector half = qd;
+  catch_up(levels, distance, box, qd);
+  EXPECT_NEAR(qd[0], 0.1, 1e-12);
+  EXPECT_NEAR(qd[1], 0.1, 1e-12);
+  catch_up(levels, row({1.0, 0.0}, 0.1, 0.5), box, half);
+  EXPECT_NEAR(half[0], 0.5 * (0.1 + 0.1 / 30.0), 1e-12);
+}
+
+TEST(CatchUp, NeverLeavesTheBoxNorLowersTheFirstRow) {
+  Random random(12);
+  for (int trial = 0; trial < 2000; ++trial) {
+    const Eigen::Index n = 7;
+    const std::vector<JointVector> levels{random_vector(random, n, -3, 3),
+                                          random_vector(random, n, -3, 3)};
+    const JointVector low = random_vector(random, n, -1, 0), high = random_vector(random, n, 0, 1);
+    const Admissible box{low, high, 3.0 * low, 3.0 * high};
+    Task task;
+    task.jacobian = TaskJacobian(3, n);
+    for (Eigen::Index i = 0; i < 3; ++i)
+      task.jacobian.row(i) = random_vector(random, n, -1, 1).transpose();
+    task.rate = RowVector::Zero(3);
+    task.activation = random_vector(random, 3, 0, 1);
+    const JointVector before = random_vector(random, n, 0, 1).cwiseProduct(high - low) + low;
+    JointVector qd = before;
+    Task first = task;
+    first.activation.tail(2).setZero();
+    JointVector alone = before;
+    catch_up(levels, first, box, alone);
+    EXPECT_GE(first.jacobian.row(0).dot(alone), first.jacobian.row(0).dot(before) - 1e-12);
+    catch_up(levels, task, box, qd);
+    ASSERT_TRUE(inside(qd, box) && inside(alone, box));
+    task.activation.setZero();
+    qd = before;
+    catch_up(levels, task, box, qd);
+    EXPECT_EQ(qd, before);
+  }
+}
+
 TEST(Command, AllocatesNothing) {
   Random random(7);
   const Limits limits = random_limits(random, 12);
@@ -306,6 +351,7 @@ TEST(Command, AllocatesNothing) {
     const Admissible box = admissible(limits, JointVector::Zero(12), qd, kDt);
     command(stack.levels, stack.tasks, qd, box, out);
     keep_rate(direction, 0.1, box, out);
+    for (const Task& task : stack.tasks) catch_up(stack.levels, task, box, out);
     qd = out;
     decelerate(qd, box, out);
   }

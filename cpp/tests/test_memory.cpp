@@ -1,9 +1,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <optional>
 #include <set>
+#include <vector>
 
 #include "perception.hpp"
 #include "proxcgal/controller.hpp"
@@ -70,6 +72,41 @@ TEST_F(Remembering, AScanThatSeesTheSurfaceAgainStandsForIt) {
   leave(point(0.01, 0.01, 0.5), view(0.07, 0.51F, 0.51F));
   memory.update(0.07);
   EXPECT_EQ(count(), 0);
+}
+
+TEST_F(Remembering, ASensorThatPassesASurfaceSlowlyLeavesAllItSawBehind) {
+  // 5 mm a scan, where a zone is 49 mm wide: each scan's points are beside the last one's.
+  Memory long_one({.memory_s = 60.0}, kModel, 1);
+  const auto scan_at = [](int k) {
+    ScanView scan = view(0.07 * k, 0.5F, 0.5F);
+    scan.T_WS.translation().x() = 0.005 * k;
+    return scan;
+  };
+  const double pitch = kModel.field_of_view / 8.0;
+  const auto points = [&](int k) {
+    std::vector<RememberedPoint> out;
+    for (int zone = 0; zone < kZones; ++zone) {
+      const double x = 0.5 * std::tan((zone % 8 - 3.5) * pitch);
+      const double y = 0.5 * std::tan((zone / 8 - 3.5) * pitch);
+      out.push_back(point(0.005 * k + x, y, 0.5, 0.07 * k));
+    }
+    return out;
+  };
+  constexpr int scans = 200;  // 1 m
+  for (int k = 0; k < scans; ++k) {
+    long_one.leave(points(k), scan_at(k + 1), *robot, posture);
+    long_one.see(0, scan_at(k + 1));
+    long_one.update(0.07 * (k + 1));
+  }
+  const auto held_W = long_one.points_W();
+  const double voxel = MemoryConfig{}.voxel;
+  for (int k = 0; k < scans - 100; ++k) {  // what has left the view by now
+    for (const RememberedPoint& seen : points(k)) {
+      const auto apart = held_W.rowwise() - seen.point_W.transpose();
+      EXPECT_LT(apart.rowwise().norm().minCoeff(), std::sqrt(3.0) * voxel) << k;
+    }
+  }
+  EXPECT_LT(held_W.rows(), 8 * 30);  // one a voxel: no scan heaps up what the last one left
 }
 
 TEST_F(Remembering, WhatIsNotClearlySeenThroughStays) {

@@ -145,4 +145,16 @@ double keep_rate(const JointVector& row, double least, const Admissible& box, Jo
   return rate;
 }
 
+void catch_up(std::span<const JointVector> levels, const Task& task, const Admissible& box,
+              JointVector& qd) {
+  if (!(task.activation.array() > 0.0).any()) return;
+  const JointVector target = steady_target(levels, box).qd;
+  for (Eigen::Index i = task.activation.size(); i-- > 0;) {
+    if (!(task.activation[i] > 0.0)) continue;
+    const JointVector row = task.jacobian.row(i).transpose();
+    const double now = row.dot(qd), behind = row.dot(target) - now;
+    if (behind > 0.0) keep_rate(row, now + task.activation[i] * behind, box, qd);
+  }
+}
+
 }  // namespace proxcgal

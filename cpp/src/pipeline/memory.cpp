@@ -113,13 +113,28 @@ struct Memory::Impl {
     return static_cast<float>(model.sigmas * sigma + 0.5 * config.voxel);
   }
 
+  /// Does the ray of a zone pass the voxel of a point as deep as the point is?
+  ///
+  /// A zone is wider than a voxel: what it measures beside a point does not stand for the point.
+  /// If it did, each scan's point would take the place of the last one's, and an arm that passes
+  /// by slowly would drag them along and leave nothing behind.
+  bool passes(const ScanView& view, int zx, int zy, float pz,
+              const detail::VoxelIndex::Key& voxel) const {
+    const Vector3 on_ray_S(zones.middle[static_cast<std::size_t>(zx)] * pz,
+                           zones.middle[static_cast<std::size_t>(zy)] * pz, pz);
+    return index.key(view.T_WS * on_ray_S) == voxel;
+  }
+
   /// @param point_S  inside the field of view
-  Verdict judge(const ScanView& view, float px, float py, float pz) const {
+  /// @param voxel    that the point lies in
+  Verdict judge(const ScanView& view, float px, float py, float pz,
+                const detail::VoxelIndex::Key& voxel) const {
     const float tx = px / pz, ty = py / pz, far = margin(static_cast<double>(pz));
     const int zx = std::clamp(Zones::below(zones.border, tx), 0, kSide - 1);
     const int zy = std::clamp(Zones::below(zones.border, ty), 0, kSide - 1);
     const float seen = view.obstacle[static_cast<std::size_t>(kSide * zy + zx)];
-    if (seen > 0.0F && std::abs(seen - pz) <= far) return Verdict::kThere;
+    if (seen > 0.0F && std::abs(seen - pz) <= far)
+      return passes(view, zx, zy, pz, voxel) ? Verdict::kThere : Verdict::kNothing;
     const int cx = Zones::below(zones.middle, tx), cy = Zones::below(zones.middle, ty);
     if (cx < 0 || cy < 0 || cx >= kSide - 1 || cy >= kSide - 1) return Verdict::kNothing;
     for (const int corner : {0, 1, kSide, kSide + 1}) {
@@ -138,7 +153,7 @@ struct Memory::Impl {
                pz = static_cast<float>(point_S.z());
     const float wide = zones.edge() * pz;
     if (!(pz > kNearest && std::abs(px) <= wide && std::abs(py) <= wide)) return Verdict::kNothing;
-    return judge(view, px, py, pz);
+    return judge(view, px, py, pz, index.key(point_W));
   }
 
   void write(int row, const RememberedPoint& from, bool was_through, double now) {
@@ -280,7 +295,9 @@ struct Memory::Impl {
       }
       for (int i = n - 1; i >= 0; --i) {
         const auto to = static_cast<std::size_t>(i);
-        if (in[to] != 0) take(begin + i, view, judge(view, px[to], py[to], pz[to]));
+        if (in[to] == 0) continue;
+        const auto at = static_cast<std::size_t>(begin + i);
+        take(begin + i, view, judge(view, px[to], py[to], pz[to], key[at]));
       }
       left -= n;
       row = begin - 1;

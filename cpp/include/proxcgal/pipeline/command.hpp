@@ -56,4 +56,15 @@ void decelerate(const JointVector& qd_last, const Admissible& box, JointVector& 
 /// @return     row qd, under `least` only where no velocity in the box reaches it
 double keep_rate(const JointVector& row, double least, const Admissible& box, JointVector& qd);
 
+/// Raises what `qd` does for each row of `task` towards what the target of `command` does for it.
+///
+/// `command` goes straight towards its target, as far as the slowest joint's acceleration limit
+/// allows: where a lower level wants fast joints, a distance row gets the same small share of its
+/// change as they, and stays behind although there is room for all of it. Each row makes up the
+/// share a of that, its activation, changing `qd` as little as possible; the first row comes last,
+/// so that it has the last word.
+/// @param task  rows whose rate is better the higher it is: distances
+void catch_up(std::span<const JointVector> levels, const Task& task, const Admissible& box,
+              JointVector& qd);
+
 }  // namespace proxcgal

@@ -45,8 +45,8 @@ struct RememberedPoint {
 
 /// Points that no current scan shows any more, in voxels of the world. Storage is made at set-up.
 ///
-/// A point comes in when its sensor's next scan does not see its surface again. It leaves
-///   - when a scan sees that surface again: the scan's own point stands for it;
+/// A point comes in when its sensor's next scan does not measure its voxel again. It leaves
+///   - when a zone's ray passes its voxel and ends there: the scan's own point stands for it;
 ///   - when the rays round it end well beyond it, in `clear_scans` scans: it is gone;
 ///   - when it is `memory_s` old;
 ///   - when there are too many, and it is one of those farthest from the arm; never the nearest.
