@@ -98,6 +98,22 @@ def test_replays_are_bit_identical(ur10e: px.Robot, tmp_path: Any) -> None:
     assert first_difference(recording) is None
 
 
+@pytest.mark.parametrize(
+    ("assignment", "told"),
+    [
+        ("memory.voxel=1.0", "less than or equal to 0.5"),
+        ("memory.max_points=2", "greater than or equal to 3"),
+        ("memory.clear_scans=101", "less than or equal to 100"),
+        ("motion.window=2.0", "less than or equal to 1"),
+        ("motion.radius=1.5", "less than or equal to 1"),
+    ],
+)
+def test_a_scenario_is_refused_whichever_controller_runs(assignment: str, told: str) -> None:
+    key = assignment.partition("=")[0]
+    with pytest.raises(px.ConfigError, match=rf"controller\.{key} = .*{told}"):
+        load_scenario("side_plane", [f"controller.{assignment}"])
+
+
 def test_what_is_not_a_number_or_below_nothing_is_refused() -> None:
     for keys in ({"memory_s": -1.0}, {"voxel": 0.0}, {"max_points": 0}, {"clear_scans": 0}):
         with pytest.raises(px.ConfigError, match=next(iter(keys))):

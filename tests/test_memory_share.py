@@ -4,7 +4,7 @@ from typing import Any
 
 import polars as pl
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from proxcgal.study.memory_share import memory_sentences, memory_summary
@@ -35,6 +35,7 @@ def draw(number: int, wb: float, memory: float, kind: str) -> list[dict[str, Any
     ]
 
 
+@settings(deadline=None, max_examples=15)
 @given(
     st.lists(
         st.tuples(st.floats(0.0, 0.3), st.floats(0.0, 0.3), st.sampled_from(KINDS)),

@@ -403,6 +403,25 @@ TEST(Motion, ThreeScansTellTheVelocityOfWhatComesNearer) {
   EXPECT_EQ(tracked(random, velocity, plane, 2), Vector3(Vector3::Zero()));
 }
 
+TEST(Motion, FromATenthOfAMetreOnTheSizeOfAPlateThatComesNearerMattersLittle) {
+  Random random(16);
+  const Vector3 velocity(0, 0, -0.5);
+  for (int trial = 0; trial < 200; ++trial) {
+    const double half = random.uniform(0.05, 0.15);
+    Motion motion(MotionConfig{}, 10);
+    for (int scan = 0; scan < 3; ++scan) {
+      std::vector<Vector3> points;
+      for (int i = 0; i < 40; ++i) {
+        const Vector3 on(random.uniform(-half, half), random.uniform(-half, half), 0.8);
+        points.push_back(on + velocity * ((scan - 2) / 15.0) + Vector3(0, 0, noise(random, 0.006)));
+      }
+      motion.see(scan / 15.0, points);
+    }
+    const Vector3 told = motion.velocity_W(2 / 15.0, Vector3(0, 0, 0.8));
+    EXPECT_LT(std::abs(told.z() - velocity.z()), 0.1) << half;
+  }
+}
+
 TEST(Motion, WhatWasNotSeenForAWhileHasNoVelocity) {
   Motion motion(MotionConfig{}, 1);
   Random random(8);

@@ -5,8 +5,8 @@
 #include <numbers>
 #include <vector>
 
+#include "frames.hpp"
 #include "geometry/point_chunk.hpp"
-#include "proxcgal/pipeline/distance.hpp"
 #include "require.hpp"
 #include "voxel_index.hpp"
 
@@ -208,13 +208,33 @@ struct Memory::Impl {
     }
   }
 
+  /// Sets `nearest`; squared distance to the arm [m^2]. Asks the likeliest row first, then each
+  /// that its `bound` leaves open.
+  double find_nearest(const Robot& robot, const Posture& posture, std::int64_t* steps) {
+    double squared = kInfinity;
+    const auto ask = [&](int row) {
+      const Vector3 point_W = points_W.row(row).transpose();
+      for (int link = 0; link < robot.n_links(); ++link) {
+        const Pose& T_WL = posture.T_WL[static_cast<std::size_t>(link)];
+        const auto found = robot.tree(link).nearest(detail::into(T_WL, point_W), squared, steps);
+        if (!found) continue;
+        squared = found->squared_distance;
+        nearest = row;
+      }
+    };
+    nearest = -1;
+    ask(static_cast<int>(std::min_element(bound.begin(), bound.begin() + count) - bound.begin()));
+    for (int row = 0; row < count && (steps == nullptr || *steps >= 0); ++row)
+      if (static_cast<double>(bound[static_cast<std::size_t>(row)]) < squared) ask(row);
+    return squared;
+  }
+
   /// Forgets the farther half; of what is equally far as much as is needed. Boxes say what is far,
   /// but the nearest point is asked for itself: many others may lie inside a box, off its link.
   void make_room(const Robot& robot, const Posture& posture, std::int64_t* steps) {
     const auto rows_W = points_W.topRows(count);
-    const ClosestPair pair = closest_pair(robot, posture, rows_W, Method::kFast, {.steps = steps});
-    nearest = pair.point;
     bounds(rows_W, robot, posture, bound.data());
+    const double reach = find_nearest(robot, posture, steps);
     std::copy_n(bound.begin(), count, sorted.begin());
     const auto middle = sorted.begin() + count / 2;
     std::nth_element(sorted.begin(), middle, sorted.begin() + count);
@@ -228,7 +248,6 @@ struct Memory::Impl {
       }
     }
     // Rounded up: what comes next may be nearer than the nearest, and yet outside of all boxes.
-    const double reach = pair.distance * pair.distance;
     limit = std::max(limit, std::nextafter(static_cast<float>(reach), INFINITY));
   }
 

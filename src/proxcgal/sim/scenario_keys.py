@@ -96,8 +96,8 @@ def like(
     attribute: str,
     description: str,
     *,
-    ge: int | None = None,
-    le: int | None = None,
+    ge: float | None = None,
+    le: float | None = None,
     lt: int | None = None,
 ) -> Any:
     """A field whose default is that of the core's struct; bounds as pydantic names them."""

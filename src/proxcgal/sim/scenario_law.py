@@ -125,12 +125,21 @@ class Memory(Section):
     memory_s: NonNegative = like(
         "MemoryConfig", "memory_s", "[s] age at which a point is forgotten in any case; 0: none"
     )
-    voxel: Positive = like("MemoryConfig", "voxel", "[m] edge; each holds one point, the newest")
-    max_points: Count = like(
-        "MemoryConfig", "max_points", "3 or more; beyond, the farthest from the arm are forgotten"
+    voxel: Positive = like(
+        "MemoryConfig", "voxel", "[m] edge; each holds one point, the newest", ge=0.005, le=0.5
+    )
+    max_points: int = like(
+        "MemoryConfig",
+        "max_points",
+        "beyond, the farthest from the arm are forgotten",
+        ge=3,
+        le=65536,
     )
     clear_scans: Count = like(
-        "MemoryConfig", "clear_scans", "that must see through a point before it counts as gone"
+        "MemoryConfig",
+        "clear_scans",
+        "that must see through a point before it counts as gone",
+        le=100,
     )
 
 
@@ -140,9 +149,9 @@ class Motion(Section):
     controllers: tuple[SensedController, ...] = Field(
         ("wb_memory",), description="of wb, sm, wb_memory: those that use it"
     )
-    window: Positive = like("MotionConfig", "window", "[s] scans that old count")
+    window: Positive = like("MotionConfig", "window", "[s] scans that old count", le=1)
     radius: Positive = like(
-        "MotionConfig", "radius", "[m] of the patch of surface round the closest point"
+        "MotionConfig", "radius", "[m] of the patch of surface round the closest point", le=1
     )
     confidence: NonNegative = like(
         "MotionConfig", "confidence", "standard deviations below which a velocity counts as none"
