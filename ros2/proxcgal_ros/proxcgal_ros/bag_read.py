@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rosbags.highlevel import AnyReader, AnyReaderError
+from rosbags.highlevel import AnyReader
 
 from proxcgal.errors import ConfigError
 from proxcgal.sim.loop import run_ticks
@@ -119,8 +119,11 @@ class _Content:
                 for connection, stamp, data in reader.messages(connections=_wanted(reader)):
                     message = decoded(data, connection.msgtype, store)
                     self._take(connection.topic, stamp, message)
-        except (AnyReaderError, OSError) as error:
-            raise ConfigError(f"bag {bag}: cannot be read: {error}") from None
+        except ConfigError:
+            raise
+        except Exception as error:  # readers do not say what a damaged file makes them raise
+            reason = str(error) or type(error).__name__
+            raise ConfigError(f"bag {bag}: cannot be read: {reason}") from None
 
     def _take(self, topic: str, stamp: int, message: Any) -> None:
         if topic.endswith(f"/{topics.SCENARIO}"):

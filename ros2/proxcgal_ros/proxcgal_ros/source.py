@@ -183,6 +183,8 @@ class RosSource:
         now = self._clocks.now()
         assert self._q is not None
         self._early += 1
+        if self._fresh:  # it has come too early for a tick of its own, which is given the same
+            return self._given(now, self._q)
         ahead = min(max(now - self._q_stamp, 0.0), OVERDUE * self._period)
         return self._given(now, self._q + ahead * self._v)
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
 from collections import Counter
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -121,6 +123,26 @@ def test_what_is_no_bag_is_told_in_a_line(
         replay_bag(tmp_path / "nothing")
     with pytest.raises(ConfigError, match="is there already"):
         write_bag(recording.path, bag[0])
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_damaged_bag_is_an_error_of_ours_at_most(
+    bag: tuple[Path, dict[str, int]], tmp_path: Path, seed: int
+) -> None:
+    damaged = tmp_path / "damaged"
+    shutil.copytree(bag[0], damaged)
+    (file,) = damaged.glob("*.mcap")
+    data = bytearray(file.read_bytes())
+    random = np.random.default_rng(seed)
+    if seed == 0:
+        file.write_bytes(data[: len(data) // 2])
+        with pytest.raises(ConfigError, match="cannot be read"):
+            replay_bag(damaged)
+    for place in random.integers(1000, len(data) - 2000, 20):
+        data[place] ^= 0xFF
+    file.write_bytes(data)
+    with suppress(ConfigError):  # not every byte matters
+        replay_bag(damaged)
 
 
 @pytest.mark.parametrize("seed", range(20))
