@@ -48,9 +48,9 @@ def listings(summary: Summary) -> list[Listing]:
         ),
         Listing(
             caption=f"{_sentence(compared)} on known obstacles, and on what sensors see. Reached: "
-            "runs that did. Least and median of the true distances. Too close: runs that came under "
-            "0.05 m; unseen: those of them in which the cloud's nearest point was then more than "
-            "0.05 m farther away than the obstacle. Link: the one that came nearest.",
+            "runs that did. Least and median of the true distances. Too close: runs that came "
+            "under 0.05 m; unseen: those of them in which the cloud's nearest point was then more "
+            "than 0.05 m farther away than the obstacle. Link: the one that came nearest.",
             names=("scene", "init", "perception", "link", "runs", "reached", "least", "median",
                    "too close", "unseen"),
             units=("", "", "", "", "", "runs", "m", "m", "runs", "runs"),
