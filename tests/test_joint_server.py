@@ -1,7 +1,9 @@
 """Goals for the 12-joint robot: refused before anything moves, or ended exactly once."""
 
 import math
+import threading
 import time as clock
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +12,9 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
 import proxcgal as px
+from proxcgal.apps import joint_server
 from proxcgal.apps.joint_server import goal_pose, reach_of
+from proxcgal.sim.finish import Ending
 
 REACHED = (3.0, 0.291, 1.05)
 _robots: dict[str, px.Robot] = {}
@@ -22,9 +26,9 @@ def robot() -> px.Robot:
     return _robots["joint"]
 
 
-def server(scenario: str = "joint_free", **options: object) -> px.JointRobotServer:
+def server(scenario: str = "joint_free", *changes: str, **options: object) -> px.JointRobotServer:
     # 100 ticks a second are enough to see how goals end.
-    overrides = ["simulation.control_hz=100.0", "simulation.known_spacing=0.05"]
+    overrides = ["simulation.control_hz=100.0", "simulation.known_spacing=0.05", *changes]
     return px.JointRobotServer(scenario, overrides, robot=robot(), **options)  # type: ignore[arg-type]
 
 
@@ -56,6 +60,30 @@ def test_a_goal_held_off_by_an_obstacle_is_aborted_with_what_holds_it() -> None:
         assert "cylinder" in end.reason
         assert f"{end.position_error_m:.3f} m" in end.reason
         assert np.abs(arm.q).max() < 10.0
+
+
+def test_ticks_go_on_while_it_is_found_out_what_held_the_arm(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    known = threading.Event()
+
+    def slowly(_setup: object, ending: Ending, *_: object) -> Ending:
+        assert known.wait(10.0)
+        return replace(ending, reason="found out")
+
+    monkeypatch.setattr(joint_server, "concluded", slowly)
+    with server("joint_free", "finish.patience=0.2", "finish.progress=5.0") as arm:
+        number = arm.send_goal(px.JointGoal(translation=REACHED, init="jl"))
+        for _ in range(300):
+            arm.step(wait=False)
+        assert arm.result(number) is None
+        stands = arm.q
+        arm.step(wait=False)
+        np.testing.assert_allclose(arm.q, stands, atol=1e-4)
+        known.set()
+        while (end := arm.result(number)) is None:
+            arm.step(wait=False)
+        assert (end.outcome, end.reason) == ("aborted", "found out")
 
 
 @pytest.mark.parametrize(
@@ -167,7 +195,7 @@ def test_a_stop_outlives_a_change_of_tasks_and_a_goal_that_waits_to_begin() -> N
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
 def test_a_goal_ends_when_the_thread_that_makes_the_ticks_fails() -> None:
     class Failing(px.JointRobotServer):  # type: ignore[misc, valid-type]
-        def step(self) -> None:
+        def step(self, *, wait: bool = True) -> None:
             raise RuntimeError("no more")
 
     overrides = ["simulation.control_hz=100.0", "simulation.known_spacing=0.05"]

@@ -104,6 +104,13 @@ def test_a_trap_is_told_with_what_holds_it() -> None:
     assert listings(summary(held))[0].rows[0][3] == "avoidance"
 
 
+def test_another_stacks_run_is_told_in_sentences_too(call: Callable[..., Any]) -> None:
+    answer = call("run", "joint_cylinder", "--set", *SHORT, 'controller.tasks=["thesis"]',
+                  'initial=["jl"]', "--quiet", "--workers", "1")  # fmt: skip
+    assert answer.code == 0, answer.err
+    assert "Known obstacles, the thesis stack: 0 of 1 runs reach the goal." in answer.out
+
+
 def test_run_writes_an_entry_for_each_start(call: Callable[..., Any]) -> None:
     answer = call("run", "joint_cylinder", "--set", *SHORT, "--quiet", "--workers", "1")
     assert answer.code == 0, answer.err

@@ -3,7 +3,10 @@
 import asyncio
 import contextlib
 import json
+import signal
 import socket
+import subprocess
+import sys
 import threading
 import time as clock
 from collections.abc import Iterator
@@ -112,6 +115,25 @@ def test_cancel_and_refusals_are_answered(served: Served) -> None:
     client.send({"op": "cancel", "goal": number})
     assert client.read("refused")["reason"] == "this goal is not executed"
     client.close()
+
+
+def test_whoever_waits_for_a_goal_is_told_when_the_server_ends() -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", "import sys; from proxcgal.apps.cli import main; sys.exit(main())",
+         "serve", "--port", "0"], stderr=subprocess.PIPE, text=True,
+    ) as process:  # fmt: skip
+        assert process.stderr is not None
+        line = next(text for text in process.stderr if "listening on" in text)
+        client = Client(int(line.rpartition(":")[2]))
+        client.send({"op": "goal", "translation": REACHED, "init": "jl"})
+        number = client.read("accepted")["goal"]
+        process.send_signal(signal.SIGINT)
+        result = client.read("result")
+        assert (result["goal"], result["outcome"]) == (number, "aborted")
+        assert result["reason"] == "the server was closed"
+        assert client.read() == {}
+        client.close()
+        assert process.wait(10.0) == 130
 
 
 def test_a_goal_ends_when_its_client_is_gone(served: Served) -> None:

@@ -88,6 +88,8 @@ class _Active:
     watch: GoalWatch | None = None
     state: State = "starting"
     cancelled: float = math.inf  # [s] when
+    over: bool = False  # it is followed no more: what held the arm is being found out
+    ending: Ending | None = None  # what came of that
 
 
 class JointRobotServer(Closing):
@@ -217,10 +219,15 @@ class JointRobotServer(Closing):
             active.state, active.cancelled = "cancelling", self._time
             return True
 
-    def step(self) -> None:
-        """One tick: the arm moves by its last command, and is given the next."""
+    def step(self, *, wait: bool = True) -> None:
+        """One tick: the arm moves by its last command, and is given the next.
+
+        Args:
+            wait: find out within the tick what holds an arm that is given up, which takes many
+                ticks' time; otherwise that is done beside them, and the goal ends when it is known.
+        """
         with self._lock:
-            self._step()
+            self._step(wait=wait)
 
     def feedback(self) -> GoalFeedback | None:
         """How the goal that is executed is doing; None where there is none."""
@@ -273,20 +280,20 @@ class JointRobotServer(Closing):
             self._thread.start()
 
     def close(self) -> None:
-        """Ends the thread; a goal that is still executed is cancelled at once."""
+        """Ends the thread; a goal that is still executed is aborted at once."""
         self._ending.set()
         if self._thread is not None:
             self._thread.join()
             self._thread = None
         with self._lock:
             if self._active is not None:
-                self._end("cancelled", "the server was closed")
+                self._end("aborted", "the server was closed")
 
     def _spin(self) -> None:
         due = clock.monotonic()
         try:
             while not self._ending.is_set():
-                self.step()
+                self.step(wait=False)
                 due = max(due + self.period, clock.monotonic() - 0.1)  # what is lost stays lost
                 self._ending.wait(max(due - clock.monotonic(), 0.0))
         except Exception as error:  # else a goal would wait for its end for ever
@@ -360,16 +367,18 @@ class JointRobotServer(Closing):
         self._law = self._made()
         self._begin(active)
 
-    def _step(self) -> None:
+    def _step(self, *, wait: bool) -> None:
         period = self.period
         self._q = self._q + self._qd * period
         active = self._active
         T_WT = np.asarray(self.robot.tool_pose(self._q))
         if active is not None:
-            self._advance(active, T_WT)
+            self._advance(active, T_WT, wait=wait)
             active = self._active
         moving = active is not None and active.state == "executing" and active.T_WT is not None
-        if active is not None and not moving:
+        if active is not None and active.over:
+            moving = False  # it stays where it was given up
+        elif active is not None and not moving:
             self._held = T_WT  # nothing is asked of the tool: it comes to rest
         goal = active.T_WT if moving and active is not None else self._held
         cloud = self._cloud
@@ -381,12 +390,15 @@ class JointRobotServer(Closing):
         self._last = TickResult.of(out, 0, 0.0)
         self._qd = self._last.qd
 
-    def _advance(self, active: _Active, T_WT: Array) -> None:
+    def _advance(self, active: _Active, T_WT: Array, *, wait: bool) -> None:
         """Whether the goal ends before this tick, or can begin."""
         resting = bool(np.abs(self._qd).max() <= AT_REST)
         if active.state == "cancelling":
             if resting or self._time - active.cancelled > STOPPED_AFTER:
                 self._end("cancelled", "cancelled by the client")
+        elif active.over:
+            if active.ending is not None:
+                self._end(active.ending.outcome, active.ending.reason)
         elif self._stopped and self._last is not None:
             found = ", ".join(sorted({f.reason for f in self._last.findings}))
             self._end("aborted", f"the monitor stopped the arm: {found}")
@@ -396,16 +408,32 @@ class JointRobotServer(Closing):
         elif active.watch is not None:
             ending = active.watch(self._time - active.begun, T_WT)
             if ending is not None:
-                self._conclude(ending, active)
+                self._conclude(ending, active, wait=wait)
 
-    def _conclude(self, ending: Ending, active: _Active) -> None:
-        if ending.outcome != "succeeded" and self._last is not None:
-            given = TickInput(time=self._time, q=self._q, goal=self._setup.goal, known=True)
-            last = Tick(given, self._last, TickTruth())
-            ending = concluded(self._setup, ending, last, self._cloud(self._time))
-        self._end(ending.outcome, ending.reason)
-        if ending.outcome == "succeeded" and active.T_WT is not None:
-            self._held = active.T_WT
+    def _conclude(self, ending: Ending, active: _Active, *, wait: bool) -> None:
+        if ending.outcome == "succeeded" or self._last is None:
+            self._end(ending.outcome, ending.reason)
+            if ending.outcome == "succeeded" and active.T_WT is not None:
+                self._held = active.T_WT
+            return
+        given = TickInput(time=self._time, q=self._q, goal=self._setup.goal, known=True)
+        last, setup = Tick(given, self._last, TickTruth()), self._setup
+        points_W = np.array(self._cloud(self._time))
+
+        def judge() -> None:
+            try:
+                active.ending = concluded(setup, ending, last, points_W)
+            except ProxError:  # then without what held it
+                active.ending = ending
+
+        if wait:
+            judge()
+            found = active.ending or ending
+            self._end(found.outcome, found.reason)
+            return
+        self._held = np.asarray(self.robot.tool_pose(self._q))
+        active.over = True
+        threading.Thread(target=judge, daemon=True).start()
 
     def _end(self, outcome: Outcome, reason: str) -> None:
         """The one place where a goal ends."""

@@ -71,7 +71,7 @@ class RunOptions:
     workers: Number = None
     """Processes that simulate; left out: one a processor."""
     no_picture: Flag = False
-    """Leave the moving picture out."""
+    """Leave the moving picture out; runs of kind `joint` draw none."""
     quiet: Flag = False
     """No progress on stderr."""
 

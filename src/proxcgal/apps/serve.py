@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import ipaddress
 import json
+import signal
 import sys
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -24,6 +25,7 @@ RATE = 20.0  # [1/s] messages of one client, in the long run
 BURST = 20  # at once
 UNREAD_BYTES = 1 << 18  # that a client may leave unread before it is dropped
 FEEDBACK_S = 0.1  # [s] between two feedbacks
+CLOSE_S = 1.0  # [s] that a client has to read its last message
 
 
 @dataclass(frozen=True)
@@ -94,8 +96,17 @@ async def _serve(robot: JointRobotServer, options: ServeOptions) -> None:
     host, port = server.sockets[0].getsockname()[:2]
     if not options.quiet:
         print(f"listening on {host}:{port}", file=sys.stderr, flush=True)
+    stop = asyncio.current_task()
+    assert stop is not None
+    # Ctrl-C cancels this task already; a service manager's wish to end does the same.
+    with contextlib.suppress(NotImplementedError):
+        asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, stop.cancel)
     async with server:
-        await front.run()
+        try:
+            await front.run()
+        finally:
+            server.close()
+            await front.close()
 
 
 @dataclass(eq=False)
@@ -148,13 +159,28 @@ class Front:
         loop = asyncio.get_running_loop()
         due = told = loop.time()
         while True:
-            self._robot.step()
+            self._robot.step(wait=False)
             self._tell_results()
             if loop.time() >= told:
                 told = loop.time() + FEEDBACK_S
                 self._tell_feedback()
             due = max(due + self._robot.period, loop.time() - FEEDBACK_S)
             await asyncio.sleep(max(due - loop.time(), 0.0))
+
+    async def close(self) -> None:
+        """Ends the goal that is executed, tells its client, and lets all of them go."""
+        self._robot.close()
+        self._tell_results()
+        clients = list(self._clients)
+        for client in clients:
+            client.writer.close()
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(
+                asyncio.gather(
+                    *(client.writer.wait_closed() for client in clients), return_exceptions=True
+                ),
+                CLOSE_S,
+            )
 
     async def _client(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         client = _Client(writer, refilled=asyncio.get_running_loop().time())

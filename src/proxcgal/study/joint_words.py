@@ -33,6 +33,7 @@ def listings(summary: Summary) -> list[Listing]:
     """A row for each known run, then one for each way of sensing, start and scene."""
     runs = summary["runs"]
     known = [run for run in runs if run["perception"] == "known"]
+    compared = _stack_words(_full(runs))
     return [
         Listing(
             caption="Known obstacles, each stack. End: reached (0.03 m, 0.05 rad, unless the file "
@@ -46,10 +47,10 @@ def listings(summary: Summary) -> list[Listing]:
             rows=[_known_row(run) for run in known], left=4,
         ),
         Listing(
-            caption="The full stack on known obstacles, and on what sensors see. Reached: runs "
-            "that did. Least and median of the true distances. Too close: runs that came under "
-            "0.05 m; unseen: those of them in which the cloud's nearest point was then more than "
-            "0.05 m farther away than the obstacle. Link: the one that came nearest.",
+            caption=f"{_sentence(compared)} on known obstacles, and on what sensors see. Reached: "
+            "runs that did. Least and median of the true distances. Too close: runs that came "
+            "under 0.05 m; unseen: those of them in which the cloud's nearest point was then more "
+            "than 0.05 m farther away than the obstacle. Link: the one that came nearest.",
             names=("scene", "init", "perception", "link", "runs", "reached", "least", "median",
                    "too close", "unseen"),
             units=("", "", "", "", "", "runs", "m", "m", "runs", "runs"),
@@ -104,7 +105,8 @@ def _endings(runs: Sequence[Run]) -> Iterator[str]:
         return
     reached = [run for run in known if run["succeeded"]]
     yield (
-        f"Known obstacles, full stack: {len(reached)} of {len(known)} runs reach the goal"
+        f"Known obstacles, {_stack_words(known)}: "
+        f"{len(reached)} of {len(known)} runs reach the goal"
         + (f", in {_span(run['time_s'] for run in reached)} s" if reached else "")
         + "."
     )
@@ -200,7 +202,16 @@ def _second_set(runs: Sequence[Run]) -> Iterator[str]:
 
 
 def _full(runs: Sequence[Run]) -> list[Run]:
-    return [run for run in runs if run["stack"] == "full"]
+    """Those of the full stack, which the others are compared with; of a run without it, its own."""
+    stacks = [run["stack"] for run in runs]
+    compared = "full" if "full" in stacks or not stacks else stacks[0]
+    return [run for run in runs if run["stack"] == compared]
+
+
+def _stack_words(runs: Sequence[Run]) -> str:
+    """What stack these runs of one had."""
+    stack = runs[0]["stack"] if runs else "full"
+    return f"the {stack} stack" if stack in ("full", "thesis") else f"the stack of {stack}"
 
 
 def _reached(runs: Sequence[Run]) -> int:
