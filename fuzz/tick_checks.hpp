@@ -5,6 +5,7 @@
 #include <sstream>
 #include <string>
 
+#include "internal_clock.hpp"
 #include "proxcgal/controller.hpp"
 
 /// What every tick owes, whatever it is given: goal 1 of docs/reliability.md.
@@ -24,7 +25,8 @@ class TickChecks {
         robot_(controller.robot()),
         posture_(robot_.make_posture()),
         last_(JointVector::Zero(robot_.n_q())),
-        before_(last_) {
+        before_(last_),
+        clock_(controller.config().period) {
     for (const TaskSpec& task : controller.config().tasks) {
       if (const auto* avoidance = std::get_if<Avoidance>(&task)) d_min_ = avoidance->d_min;
     }
@@ -37,10 +39,8 @@ class TickChecks {
   ///              period at most and by the fiftieth part of it at least
   void before(double time) {
     before_ = last_;
-    const double period = controller_.config().period, step = time - time_;
-    const bool early = step > 0.0 && step < (1.0 - 1e-6) * period;
-    step_ = early ? std::max(step, 0.02 * period) : period;
-    if (std::isfinite(time)) time_ = time;
+    clock_.advance(time);
+    step_ = clock_.step();
   }
   /// [s] that the arm has moved with the last command.
   double step() const { return step_; }
@@ -192,7 +192,8 @@ class TickChecks {
   const Robot& robot_;
   Posture posture_;
   JointVector last_, before_;
-  double time_ = std::numeric_limits<double>::quiet_NaN(), step_ = 0.0;
+  detail::InternalClock clock_;
+  double step_ = 0.0;
   double d_min_ = 0.0;
   TickCounts counts_;
   std::ostringstream problem_;

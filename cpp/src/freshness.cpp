@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <map>
 
+#include "internal_clock.hpp"
+
 namespace proxcgal::detail {
 namespace {
 
@@ -35,7 +37,7 @@ bool Freshness::accept(double time, double delay, const Scan& scan, Monitor& mon
   // The counter may wrap: what matters is which way it moved.
   const bool advanced =
       !packets.counted || static_cast<std::int32_t>(scan.counter - packets.counter) > 0;
-  const double stamp = scan.stamp + delay;
+  const double stamp = whole_us(scan.stamp + delay);
   refused.age = time - stamp;
   if (!advanced || !(stamp <= time + kClockResolution) || !(refused.age <= kOldestStamp)) {
     monitor.add(refused);

@@ -4,7 +4,13 @@
 
 namespace proxcgal::detail {
 
-/// Advances with the caller's clock, and goes on by the nominal period through its jumps.
+/// The nearest microsecond: durations that are whole ticks stay so, whatever rounding clocks of
+/// large numbers add, and compare with bounds in the same way.
+/// @param time  [s]
+inline double whole_us(double time) { return std::round(time * 1e6) / 1e6; }
+
+/// Advances with the caller's clock, and goes on by the nominal period through its jumps. In whole
+/// microseconds.
 class InternalClock {
  public:
   explicit InternalClock(double period) : period_(period) {}
@@ -12,12 +18,15 @@ class InternalClock {
   /// @param caller  [s] the caller's time of this tick
   /// @return        could it be: finite, later than the last, by no more than half a second?
   bool advance(double caller) {
-    const double step = caller - caller_;
-    const bool good = std::isfinite(caller) && (!started_ || (step > 0.0 && step <= kLongestStep));
-    if (started_) now_ += good ? step : period_;
-    const bool early = started_ && good && step < (1.0 - kRounding) * period_;
+    const double gap = caller - caller_;
+    const bool good = std::isfinite(caller) && (!started_ || (gap > 0.0 && gap <= kLongestStep));
+    const double before = now_;
+    if (started_) now_ = whole_us(good ? caller - offset_ : now_ + period_);
+    const double step = now_ - before;
+    const bool early = started_ && step < period_ - kRounding;
     step_ = early ? std::max(step, kShortest * period_) : period_;
     if (!std::isfinite(caller)) return false;
+    if (!good || !started_) offset_ = caller - now_;
     started_ = true;
     caller_ = caller;
     return good;
@@ -32,12 +41,13 @@ class InternalClock {
 
  private:
   static constexpr double kLongestStep = 0.5;  // [s] a longer one is a clock that jumped
-  static constexpr double kRounding = 1e-6;    // of the period; what is left of sums of it
+  static constexpr double kRounding = 1.5e-6;  // [s] that whole microseconds may take from a step
   static constexpr double kShortest = 0.02;    // of the period: a clock that crawls still brakes
   double period_;
   double step_ = period_;
   bool started_ = false;
   double caller_ = 0.0, now_ = 0.0;
+  double offset_ = 0.0;  // [s] of the caller's clock at the start, or since its last jump
 };
 
 }  // namespace proxcgal::detail

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "internal_clock.hpp"
 #include "stopwatch.hpp"
 
 namespace proxcgal::detail {
@@ -72,10 +73,10 @@ void Perception::update(double time, double delay, const JointVector& q,
       filter(monitor);
       filter_us += watch.lap_us();
       placed = scan.stamp;
-      robot_->update(history_.at(scan.stamp + delay), posture_);
+      robot_->update(history_.at(whole_us(scan.stamp + delay)), posture_);
     }
     let_go(static_cast<std::size_t>(scan.sensor));
-    stage(time, scan, scan.stamp + delay, monitor);
+    stage(time, scan, whole_us(scan.stamp + delay), monitor);
     sense_us += watch.lap_us();
   }
   Stopwatch watch(timings);

@@ -145,7 +145,7 @@ def perform(trial: Trial, report: Report) -> Numbers:
     free = time > onset + row.duration + RECOVERY
     recovered = row.least == STOP or bool((log.mode[free] == RUN).all())
     told = not row.finding or log.findings.get(row.finding, 0) > 0
-    same = row.same_commands is None or _differ(trial, log, report) <= row.same_commands
+    same = not row.same_commands or _same(trial, log, report)
     calm = not ((log.leaked_points > 0) & (log.activation > 0.0)).any()
     in_time = row.least == RUN or latency <= row.within + TICK_MS / 1000.0 + _SLACK
     right = in_time and worst <= row.most and told and recovered and same
@@ -177,10 +177,10 @@ def _refused(trial: Trial, report: Report) -> Numbers:
     }  # fmt: skip
 
 
-def _differ(trial: Trial, log: TrialLog, report: Report) -> float:
-    """By how much commands differ at most from those of the same trial without the fault."""
+def _same(trial: Trial, log: TrialLog, report: Report) -> bool:
+    """Are the commands those of the same trial without the fault?"""
     other = _simulate(trial, trial.scenario.model_copy(update={"faults": ()}), report)
-    return float(np.abs(log.qd - other.qd).max())
+    return bool(np.array_equal(log.qd, other.qd))
 
 
 def _simulate(trial: Trial, scenario: Scenario, report: Report) -> TrialLog:
@@ -232,8 +232,7 @@ def listings(summary: Summary) -> list[Listing]:
             "number: a tick) and begins at a random "
             "moment, at a random sensor. Right: the required mode in time and no other, the "
             "finding told, the arm free again 0.5 s after the fault; where no command may change, "
-            "the same commands as without it: to the bit, and to 1e-12 rad/s where the clock "
-            "jumps. Latency from the fault's onset, told at the next tick (10 ms).",
+            "the same commands as without it, to the bit. Latency from the fault's onset, told at the next tick (10 ms).",
             names=("fault", "robot", "required", "runs", "right", "median", "worst", "bound",
                    "farthest mode"),
             units=("", "", "", "", "", "ms", "ms", "ms", "runs"),

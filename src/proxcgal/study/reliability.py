@@ -194,9 +194,8 @@ Every fault is put in while the arm moves among panel, walls and cabinet, at a r
 random sensor; the `[[fault]]` tables of [scenarios.md](scenarios.md#fault) do the same in any
 scenario. A run is right when the required mode comes in time and no farther one, the finding is
 told, the arm is free again half a second after the fault, and, where no command may change, the
-commands are those of the run without the fault: to the bit, and to 1e-12 rad/s where the clock
-jumps, as an hour added to a stamp costs it 4.5e-13 s of its resolution. Latency is from the fault's
-onset, told at the next tick: it may pass its bound by a tick of 10 ms.
+commands are those of the run without the fault, to the bit. Latency is from the fault's onset, told
+at the next tick: it may pass its bound by a tick of 10 ms.
 """
 
 
