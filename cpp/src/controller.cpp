@@ -20,6 +20,7 @@ namespace {
 constexpr double kExecuted = 0.5;     // share of the demanded rate that counts as executed
 constexpr double kEngaged = 0.5;      // activation from which avoidance must be executed
 constexpr double kJustBeyond = 1e-6;  // [m]
+constexpr double kRounding = 1e-9;    // [s] of sums of periods: it decides about no tick
 constexpr double kRigid = 1e-6;       // how far a goal's rotation may be from orthonormal
 
 bool is_rigid(const Pose& T) {
@@ -222,7 +223,7 @@ struct Controller::Impl {
       stuck_since = -1.0;
     } else if (stuck_since < 0.0) {
       stuck_since = clock.now();
-    } else if (clock.now() - stuck_since > config.monitor.stuck_after) {
+    } else if (clock.now() - stuck_since > config.monitor.stuck_after + kRounding) {
       note(Reason::kAvoidanceStuck, out.control.link);
     }
   }
