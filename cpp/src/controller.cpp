@@ -20,6 +20,7 @@ namespace {
 constexpr double kExecuted = 0.5;     // share of the demanded rate that counts as executed
 constexpr double kEngaged = 0.5;      // activation from which avoidance must be executed
 constexpr double kJustBeyond = 1e-6;  // [m]
+constexpr double kRounding = 1e-9;    // [s] of sums of periods: it decides about no tick
 constexpr double kRigid = 1e-6;       // how far a goal's rotation may be from orthonormal
 
 bool is_rigid(const Pose& T) {
@@ -162,13 +163,25 @@ struct Controller::Impl {
     return reach;
   }
 
-  /// The levels from the top that avoid or ask for nothing: below them another task comes first.
-  std::size_t first_of_another_kind() const {
-    std::size_t level = 0;
-    while (level < config.tasks.size() && (std::holds_alternative<Avoidance>(config.tasks[level]) ||
-                                           !(stack[level].activation.array() > 0.0).any()))
-      ++level;
-    return level;
+  /// Avoidance makes up what the command gives it less than the solver does, with the joints of
+  /// which no more important task of another kind wants anything now.
+  void catch_up_avoidance(std::span<const JointVector> levels, const Admissible& box) {
+    for (std::size_t level = config.tasks.size(); level-- > 0;) {
+      if (!std::holds_alternative<Avoidance>(config.tasks[level])) continue;
+      Admissible free = box;
+      for (std::size_t upper = 0; upper < level; ++upper) {
+        if (std::holds_alternative<Avoidance>(config.tasks[upper])) continue;
+        const Task& task = stack[upper];
+        for (Eigen::Index row = 0; row < task.activation.size(); ++row) {
+          if (!(task.activation[row] > 0.0)) continue;
+          for (Eigen::Index joint = 0; joint < out.qd.size(); ++joint) {
+            if (task.jacobian(row, joint) == 0.0) continue;
+            free.low[joint] = free.high[joint] = out.qd[joint];
+          }
+        }
+      }
+      catch_up(levels, stack[level], free, out.qd);
+    }
   }
 
   /// Is it acceleration alone that avoidance is short of, as after a HOLD that has cleared? Then
@@ -210,7 +223,7 @@ struct Controller::Impl {
       stuck_since = -1.0;
     } else if (stuck_since < 0.0) {
       stuck_since = clock.now();
-    } else if (clock.now() - stuck_since > config.monitor.stuck_after) {
+    } else if (clock.now() - stuck_since > config.monitor.stuck_after + kRounding) {
       note(Reason::kAvoidanceStuck, out.control.link);
     }
   }
@@ -267,8 +280,7 @@ struct Controller::Impl {
     const std::span<const JointVector> levels(solution.rho.data(),
                                               static_cast<std::size_t>(solution.levels) + 1);
     command(levels, tasks, qd_last, box, out.qd);
-    for (std::size_t level = first_of_another_kind(); level-- > 0;)
-      catch_up(levels, tasks[level], box, out.qd);
+    catch_up_avoidance(levels, box);
     // What is known to be there has the last word over what may be where nothing is seen.
     const JointVector solved = out.qd;
     if (sensed) caution.slow_into_unseen(clock.now(), posture, perception, box, out, monitor);
