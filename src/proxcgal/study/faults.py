@@ -232,7 +232,8 @@ def listings(summary: Summary) -> list[Listing]:
             "number: a tick) and begins at a random "
             "moment, at a random sensor. Right: the required mode in time and no other, the "
             "finding told, the arm free again 0.5 s after the fault; where no command may change, "
-            "the same commands as without it, to the bit. Latency from the fault's onset, told at the next tick (10 ms).",
+            "the same commands as without it, to the bit. Latency from the fault's onset, told at "
+            "the next tick (10 ms).",
             names=("fault", "robot", "required", "runs", "right", "median", "worst", "bound",
                    "farthest mode"),
             units=("", "", "", "", "", "ms", "ms", "ms", "runs"),
