@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from proxcgal.apps.view.stage import Stage
 from proxcgal.sim.frames import placed
-from proxcgal.sim.moment import Moment
+from proxcgal.sim.moment import Posed
 from proxcgal.sim.solids import Box, Capsule, Cylinder, Solid, Sphere
 
 Array = NDArray[np.float64]
@@ -74,7 +74,7 @@ class Drawing:
             **_SHAFT,
         )  # fmt: skip
 
-    def show(self, moment: Moment) -> None:
+    def show(self, moment: Posed) -> None:
         """Moves everything to where it is at that moment."""
         self._place(self._links, moment.links_W)
         self._pair(moment)
@@ -84,8 +84,9 @@ class Drawing:
         self._points(self._kept, moment.kept_W)
         self._points(self._held, moment.held_W)
         self._points(self._removed, moment.removed_W)
-        self._put(self._goal, moment.goal_W)
-        _shown(self._goal, True)
+        _shown(self._goal, moment.goal_W is not None)
+        if moment.goal_W is not None:
+            self._put(self._goal, moment.goal_W)
 
     def silence(self, off: Collection[int]) -> None:
         """Greys out the sensors of these rows, and no others."""
@@ -164,7 +165,7 @@ class Drawing:
         if on and len(points_W):
             cloud.points = points_W.astype(np.float16)
 
-    def _pair(self, moment: Moment) -> None:
+    def _pair(self, moment: Posed) -> None:
         pair = moment.control_W, moment.obstacle_W
         there = pair[0] is not None and pair[1] is not None
         _shown(self._arrow, there)
