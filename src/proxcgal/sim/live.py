@@ -152,7 +152,7 @@ class LiveTrial:
         assert self._last is not None, "step() comes first"
         given, result = self._last
         now = (self._count - 1) * self.period
-        true = self._truth(self._source.q, now).distance
+        true = self._truth.nearest(self._source.q, now).distance
         return Moment.of(
             self.setup, given, result, self.law, now, true=true, since=self.since, off=self.off,
             **self._hand(),

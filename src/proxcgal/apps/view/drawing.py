@@ -26,6 +26,7 @@ REMOVED: Color = (66, 120, 240)
 PAIR: Color = (16, 150, 60)
 GHOST_PAIR: Color = (220, 120, 20)
 SOLID: Color = (250, 186, 92)
+UNSENSED: Color = (176, 182, 190)
 SENSOR: Color = (250, 204, 40)
 SILENT: Color = (120, 120, 120)
 _VIEW: Color = (214, 176, 60)
@@ -59,7 +60,12 @@ class Drawing:
         if not ghost:
             self._views = self._sensors()
             self._solids = [
-                _solid(scene, f"{name}/scene/{row}_{label}", solid)
+                _solid(
+                    scene,
+                    f"{name}/scene/{row}_{label}",
+                    solid,
+                    SOLID if label in stage.sensed else UNSENSED,
+                )
                 for row, (label, solid) in enumerate(zip(stage.names, stage.solids, strict=True))
             ]
             self._place(self._solids, stage.solids_W)
@@ -241,9 +247,9 @@ def viewpoint(stage: Stage) -> tuple[Array, Array]:
     return target + (0.9 + 1.2 * reach) * away / np.linalg.norm(away), target
 
 
-def _solid(scene: viser.SceneApi, name: str, solid: Solid) -> Any:
+def _solid(scene: viser.SceneApi, name: str, solid: Solid, color: Color) -> Any:
     plain: dict[str, Any] = {
-        "color": SOLID,
+        "color": color,
         "opacity": 0.45 if solid.extent.max() < _WALL else 0.06,
         "cast_shadow": False,
         "receive_shadow": False,

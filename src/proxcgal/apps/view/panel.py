@@ -10,7 +10,7 @@ import viser
 import viser.transforms
 
 from proxcgal.apps.view.desk import ROOM, Desk
-from proxcgal.apps.view.drawing import pose_parts
+from proxcgal.apps.view.drawing import pose_parts, viewpoint
 from proxcgal.apps.view.exchange import Told
 from proxcgal.apps.view.gate import Gate
 from proxcgal.apps.view.messages import between, one_of, switch
@@ -19,6 +19,7 @@ from proxcgal.sim.moment import Posed
 from proxcgal.sim.walk.grip import HAND
 
 HANDLE = "/handle"
+_HANDLE_SHARE = 0.1  # of the distance that a page begins to look from: large enough to be caught
 
 
 class Panel:
@@ -86,7 +87,8 @@ class Panel:
             T_W = stage.solids_W[stage.names.index(name)]
         wxyz, position = pose_parts(T_W)
         handle = self._server.scene.add_transform_controls(
-            HANDLE, scale=0.3, depth_test=False, wxyz=wxyz, position=position,
+            HANDLE, scale=_HANDLE_SHARE * float(np.linalg.norm(np.subtract(*viewpoint(stage)))),
+            depth_test=False, wxyz=wxyz, position=position,
             translation_limits=((x0, x1), (y0, y1), (z0, z1)),
         )  # fmt: skip
 

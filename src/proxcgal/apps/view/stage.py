@@ -33,6 +33,7 @@ class Stage:
     sensors_L: Array  #: (sensors, 4, 4) T_LS
     field_of_view: float  #: [rad] of a sensor, from side to side
     names: tuple[str, ...]  #: of the solids
+    sensed: tuple[str, ...]  #: of them; no other is seen by any sensor
     grips: tuple[str, ...]  #: what can be dragged: solids that are sensed, a hand at the tool
     solids: tuple[Solid, ...]
     solids_W: Array  #: (solids, 4, 4) T_WO at the start
@@ -57,6 +58,7 @@ class Stage:
             sensors_L=np.array([mount.T_LS for mount in mounts]).reshape(-1, 4, 4),
             field_of_view=setup.scenario.skin.sensor.field_of_view,
             names=setup.drawn.names,
+            sensed=setup.scene.names,
             grips=((HAND,) if setup.scenario.kind == "guided" else ()) + setup.scene.names,
             solids=setup.drawn.solids,
             solids_W=np.asarray(setup.drawn.poses(0.0)),
@@ -81,6 +83,7 @@ class Stage:
             sensors_L=np.empty((0, 4, 4)),
             field_of_view=0.0,
             names=(OPERATOR,),
+            sensed=(OPERATOR,),
             grips=(HAND,),
             solids=(Capsule(human.radius, human.height - 2.0 * human.radius),),
             solids_W=trial.operator_W()[None],

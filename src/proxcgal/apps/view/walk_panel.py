@@ -18,7 +18,7 @@ from proxcgal.sim.walk.keys import Guard, WalkScenario
 from proxcgal.sim.walk.live import WalkMoment
 
 ENABLE = "enable torque"
-_BLUE, _RED, _GREEN, _GREY = "#2a5fb0", "#d61e28", "#10963c", "#8a8f98"
+_BLUE, _RED, _GREEN, _ORANGE = "#2a5fb0", "#d61e28", "#10963c", "#dc7814"
 _HIGHEST_M, _HIGHEST_MPS, _HIGHEST_SHARE = 1.6, 2.0, 1.5
 _HEIGHT = 150  # [px]
 _DASHED, _DOTTED = (5, 4), (2, 3)
@@ -69,8 +69,8 @@ class WalkPlots:
         )  # fmt: skip
         self._speed = plot(
             gui, "speed [m/s], time [s]", _HIGHEST_MPS, _HEIGHT,
-            ("tool", _BLUE, ()), ("towards operator", _GREEN, ()),
-            ("bound of the tool", _RED, _DOTTED), ("towards operator", _GREY, _DOTTED),
+            ("tool", _BLUE, ()), ("its bound", _RED, _DOTTED),
+            ("approach", _GREEN, ()), ("its bound", _ORANGE, _DASHED),
         )  # fmt: skip
         self._joints = plot(
             gui, "joints, share of the bound, time [s]", _HIGHEST_SHARE, _HEIGHT - 20,
@@ -103,8 +103,8 @@ class WalkPlots:
             keys.min_distance * flat,
         )  # fmt: skip
         self._speed.data = (
-            time, np.minimum(tool, _HIGHEST_MPS), np.clip(towards, 0.0, _HIGHEST_MPS),
-            keys.tcp_speed * flat, keys.max_velocity * flat,
+            time, np.minimum(tool, _HIGHEST_MPS), keys.tcp_speed * flat,
+            np.clip(towards, 0.0, _HIGHEST_MPS), keys.max_velocity * flat,
         )  # fmt: skip
         self._joints.data = (
             time,
