@@ -70,9 +70,10 @@ class Live:
             self.tab.frames(2)
             mouse.down()
             self.tab.frames(1)
-            for share in np.linspace(0.0, 1.0, 15):
+            steps = max(round(seconds / 0.04), 1)
+            for share in np.arange(1, steps + 1) / steps:
                 mouse.move(x0 + share * (x1 - x0), y0 + share * (y1 - y0))
-                self.tab.page.wait_for_timeout(1000.0 * seconds / 15)
+                self.tab.page.wait_for_timeout(1000.0 * seconds / steps)
             if until(lambda: np.linalg.norm(handle.position - begin) > 0.05, 2.0):  # noqa: B023
                 return
             mouse.up()

@@ -38,13 +38,13 @@ def test_a_hand_drags_the_tool_of_a_walk_through_and_a_fast_one_trips_the_guard(
         live.passed(0.3)
         tool = live.moment.links_W[-1][:3, 3].copy()
 
-        live.drag((-0.15, 0.0, 0.0), seconds=2.0)
+        live.drag((-0.15, 0.0, 0.0), seconds=1.0)
         assert until(lambda: live.moment.links_W[-1][0, 3] < tool[0] - 0.1)
         page.mouse.up()
         live.passed(0.5)
         assert (live.moment.state, live.moment.trips) == ("on", 0)
 
-        live.drag((-0.7, 0.0, 0.0), seconds=0.2)
+        live.drag((-0.7, 0.0, 0.0), seconds=0.0)  # in one leap
         assert until(lambda: live.moment.trips == 1)
         page.mouse.up()
         page.get_by_text(live.moment.trip).wait_for()
