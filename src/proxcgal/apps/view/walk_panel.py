@@ -119,7 +119,8 @@ def status(told: Told, moment: WalkMoment, note: str) -> str:
     lines = [f"{_state(moment)} at {moment.elapsed:.1f} s{pace(told)}"]
     if moment.trip:
         count = "" if moment.trips == 1 else f", {moment.trips} trips so far"
-        lines.append(f"tripped: **{moment.trip}**{count}")
+        when = "last trip" if moment.state == "on" else "tripped"
+        lines.append(f"{when}: **{moment.trip}**{count}")
         if moment.state == "off":
             lines.append(f"at rest {moment.stop_time:.3f} s after the trip")
     if moment.overrun:
