@@ -20,9 +20,10 @@ import viser
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from browser import chromium, until
 from proxcgal.apps.origin import machine
+from proxcgal.apps.view.exchange import Told
 from proxcgal.apps.view.gate import close, serve
 from proxcgal.apps.view.live import LivePage
-from proxcgal.apps.view.simulation import FRAME_HZ, Told, simulate
+from proxcgal.apps.view.simulation import FRAME_HZ, simulate
 from proxcgal.sim.scenario import Scenario, load_scenario
 
 CANVAS = (640, 400)  # [px]

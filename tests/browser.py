@@ -47,6 +47,13 @@ class Tab:
         self.page.screenshot(path=str(path))
         return path
 
+    def frames(self, count: int) -> None:
+        """Waits until so many were drawn."""
+        script = """(count) => new Promise(done => {
+            function next() { if (count-- <= 0) done(); else requestAnimationFrame(next); }
+            next(); })"""
+        self.page.evaluate(script, count)
+
     def frames_per_second(self, seconds: float) -> float:
         script = """(seconds) => new Promise(done => {
             let frames = 0; const start = performance.now();

@@ -19,6 +19,7 @@ from PIL import Image
 import proxcgal as px
 from proxcgal.apps import cli
 from proxcgal.apps.drawing import draw_motion
+from proxcgal.apps.replay import ReplayOptions, opens_page
 from proxcgal.sim.recording import read_recording
 from proxcgal.sim.scenario import load_scenario
 from proxcgal.study import motion
@@ -314,6 +315,22 @@ def test_replay_prints_a_line_per_tick_and_the_numbers(call: Call, results: Path
     assert len(ticks) == 40
     summary = json.loads((results / "summary.json").read_text())
     assert f"{summary['controllers']['wb']['true_min_m']:.3f}" in answer.out
+
+
+@pytest.mark.parametrize(
+    ("options", "page"),
+    [
+        ({}, True), ({"no_view": True}, False), ({"at": 0.0}, False), ({"every": 1}, False),
+        ({"step": True}, False), ({"controller": "sm"}, False), ({"set": (("seed=1",),)}, False),
+        ({"controller": "sm", "view": True}, True),
+    ],
+)  # fmt: skip
+def test_replay_opens_a_page_at_a_terminal_where_no_lines_are_asked_for(
+    options: dict[str, Any], page: bool
+) -> None:
+    asked = ReplayOptions(file=Path("wb.mcap"), **options)
+    assert opens_page(asked, terminal=True) == page
+    assert opens_page(asked, terminal=False) == asked.view
 
 
 def test_replay_thins_its_lines(call: Call, results: Path) -> None:

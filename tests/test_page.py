@@ -1,63 +1,24 @@
 """The live page in a real browser: what is dragged and switched there reaches the arm."""
 
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
 
-from browser import Tab, pixel, until
-from proxcgal.apps.view.controls import HANDLE
+from browser import Tab, until
+from live import Live
 from proxcgal.apps.view.gate import close, serve
-from proxcgal.apps.view.live import LivePage
-from proxcgal.sim.moment import Moment
-from proxcgal.sim.scenario import load_scenario
-
-
-class Live:
-    """A live page of a scene, open in a browser."""
-
-    def __init__(self, folder: Path, open_tab: Callable[[], Tab]) -> None:
-        self.folder = folder
-        self.scenario = load_scenario("front_plane")
-        self.server, self.gate = serve("127.0.0.1", 0, label="proxcgal: front_plane")
-        self.page = LivePage(self.server, self.gate, self.scenario, "wb")
-        self.address = f"http://127.0.0.1:{self.server.get_port()}/"
-        assert until(lambda: self.page.told.moment is not None)
-        self.open_tab = open_tab
-        self.tab = open_tab()
-        self.tab.open(self.address)
-        assert until(lambda: len(self.server.get_clients()) == 1)
-        self.tab.page.get_by_text("activation of avoidance").wait_for()
-
-    @property
-    def moment(self) -> Moment:
-        assert self.page.told.moment is not None
-        return self.page.told.moment
-
-    @property
-    def camera(self):  # type: ignore[no-untyped-def]
-        return next(iter(self.server.get_clients().values())).camera
-
-    def passed(self, seconds: float) -> None:
-        """Waits for that much simulated time."""
-        end = self.moment.elapsed + seconds
-        assert until(lambda: self.moment.elapsed >= end, 90.0)
-
-    def press(self, label: str) -> None:
-        self.tab.page.get_by_role("button", name=label, exact=True).first.click()
 
 
 @pytest.fixture(scope="module")
 def live(open_tab: Callable[[], Tab], tmp_path_factory: pytest.TempPathFactory) -> Iterator[Live]:
-    live = Live(tmp_path_factory.mktemp("page"), open_tab)
+    folder = tmp_path_factory.mktemp("page")
+    live = Live("front_plane", folder, open_tab, "activation of avoidance")
     try:
         yield live
     finally:
-        live.tab.page.close()
-        live.page.close()
-        close(live.server)
+        live.close()
 
 
 def test_the_page_asks_no_other_host_for_anything(live: Live) -> None:
@@ -74,17 +35,7 @@ def test_dragging_the_obstacle_to_the_flange_raises_activation_and_the_arm_goes_
 ) -> None:
     assert until(lambda: live.moment.elapsed > 4.0, 90.0)
     before, tool = live.moment, live.moment.links_W[-1][:3, 3]
-    handle = live.server.scene._handle_from_transform_controls_name[HANDLE]
-    center = np.array(handle.position)
-    along = np.array([0.2, 0.0, 0.0])  # on the handle's arrow along x
-    (x0, y0), (x1, y1) = pixel(live.camera, center + along), pixel(live.camera, center - along)
-    mouse = live.tab.page.mouse
-    mouse.move(x0, y0)
-    live.tab.page.wait_for_timeout(300)
-    mouse.down()
-    for share in np.linspace(0.0, 1.0, 15):
-        mouse.move(x0 + share * (x1 - x0), y0 + share * (y1 - y0))
-        live.tab.page.wait_for_timeout(40)
+    live.drag((-0.4, 0.0, 0.0))
     highest = before.activation
 
     def went_away() -> bool:
@@ -95,7 +46,7 @@ def test_dragging_the_obstacle_to_the_flange_raises_activation_and_the_arm_goes_
     assert until(went_away, 90.0)
     live.passed(0.5)
     live.tab.picture("dragged", live.folder)
-    mouse.up()
+    live.tab.page.mouse.up()
     assert live.moment.solids_W[0][0, 3] < before.solids_W[0][0, 3] - 0.15
     assert highest > before.activation + 0.2
 

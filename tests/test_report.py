@@ -122,6 +122,22 @@ def test_the_page_says(tmp_path: Path, fact: str) -> None:
     assert fact in checked(write_report(make_run(tmp_path / "run"))).text
 
 
+def test_the_page_tells_what_the_sensors_had_of_the_closest_points(tmp_path: Path) -> None:
+    folder = make_run(tmp_path / "run")
+    summary = json.loads((folder / "summary.json").read_text())
+    shares = {"in_view": 0.72, "remembered": 0.11, "forgotten": 0.04, "never_seen": 0.13}
+    nothing = {f"{name}_share": None for name in shares}
+    summary["closest_points"] = {
+        "wb": {f"{name}_share": share for name, share in shares.items()}, "sm": nothing,
+    }  # fmt: skip
+    assert "truly closest points" not in checked(write_report(folder)).text
+    (folder / "summary.json").write_text(json.dumps(summary))
+    table = checked(write_report(folder)).text.partition("truly closest points")[2]
+    cells = table.partition("never seen%")[2].split("\n\n")[1:3]
+    assert cells[0].split("\n") == ["wb, whole body", "72", "11", "4", "13"]
+    assert cells[1].split("\n") == ["sm, sensor points", "-", "-", "-", "-"]
+
+
 def test_pictures_are_inside_the_page(tmp_path: Path) -> None:
     page = write_report(make_run(tmp_path / "run")).read_text()
     assert base64.b64encode(PIXEL).decode() in page

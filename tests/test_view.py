@@ -18,8 +18,9 @@ from hypothesis import strategies as st
 import proxcgal as px
 from proxcgal.apps.view.choice import Choice, robots
 from proxcgal.apps.view.desk import ROOM, Desk
+from proxcgal.apps.view.exchange import Told, Wishes
 from proxcgal.apps.view.preparation import Preparation
-from proxcgal.apps.view.simulation import Told, Wishes, simulate
+from proxcgal.apps.view.simulation import simulate
 from proxcgal.models.display import display_meshes
 from proxcgal.sim.frames import pose
 from proxcgal.sim.hands import Hands, LiveScene

@@ -14,7 +14,7 @@ from proxcgal.apps.document import (
 )
 from proxcgal.apps.replays import Replays
 from proxcgal.apps.stored import About, Numbers, Run
-from proxcgal.study.analysis import SELF_LIMIT_M, shown
+from proxcgal.study.analysis import COVERAGE_KEYS, SELF_LIMIT_M, shown
 
 PICTURES = (
     (
@@ -79,6 +79,7 @@ def _parts(runs: Sequence[Run], about: About) -> Iterator[str]:
             budget -= used
             yield part
         yield replay
+        yield from _coverage(run)
         yield from _trials(run)
         yield from _recordings(run)
     yield from origin_part(about)
@@ -207,6 +208,29 @@ def _verdict(runs: Sequence[Run]) -> Iterator[str]:
 def _sentence(text: str) -> str:
     """Text as a sentence: a capital first, a full stop last."""
     return text[:1].upper() + text[1:].rstrip(". ") + "."
+
+
+def _coverage(run: Run) -> Iterator[str]:
+    """What the sensors had of the truly closest points, where a run asked."""
+    told = {
+        name: [shares.get(key) for key in COVERAGE_KEYS]
+        for name, shares in run.summary.closest_points.items()
+    }
+    if not any(share is not None for shares in told.values() for share in shares):
+        return
+    yield '<div class="scroll"><table><caption>The truly closest points of the scene: in view of a '
+    yield "sensor at the last scan; remembered, within the memory's time before (whether or not a "
+    yield "controller with memory ran); forgotten, longer ago; never seen.</caption>"
+    yield '<thead><tr><th class="left">controller</th>'
+    for name in ("in view", "remembered", "forgotten", "never seen"):
+        yield f"<th>{name}<small>%</small></th>"
+    yield "</tr></thead><tbody>"
+    for name, shares in told.items():
+        yield f'<tr><td class="left">{escape(NAMES.get(name, name))}</td>'
+        for share in shares:
+            yield f"<td>{'-' if share is None else f'{100.0 * share:.0f}'}</td>"
+        yield "</tr>"
+    yield "</tbody></table></div>"
 
 
 def _trials(run: Run) -> Iterator[str]:

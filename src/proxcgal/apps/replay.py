@@ -24,12 +24,17 @@ MODES = ("RUN", "DEGRADED", "HOLD", "STOP")
 
 @dataclass(frozen=True)
 class ReplayOptions:
-    """Step through a recording: a line per tick, then what it amounts to; or a page to scrub.
+    """Scrub through a recording on a page with a time line, or step through it line by line.
+
+    At a terminal it opens the page (one that other machines cannot reach), and prints its address.
+    It prints lines instead, one per tick, then what it amounts to: with --no-view, --at, --every,
+    --step, --controller or --set, and where its output goes into a file or another program.
 
     With --controller or --set, the commands are computed again from the recorded inputs, and
     compared with those of the recording; unchanged settings give the same, bit for bit.
 
     Examples:
+      proxcgal replay out/demo/front_plane/wb.mcap
       proxcgal replay out/demo/front_plane/wb.mcap --every 50
       proxcgal replay out/demo/front_plane/wb.mcap --at 3.2
       proxcgal replay out/demo/front_plane/wb.mcap --step
@@ -41,7 +46,9 @@ class ReplayOptions:
     """A recording that `proxcgal run` wrote (.mcap)."""
     at: Annotated[float | None, tyro.conf.arg(metavar="T", help_behavior_hint="")] = None
     """Show all of the tick at this time [s], instead of a line per tick."""
-    every: Annotated[int, tyro.conf.arg(metavar="N")] = 1
+    every: Annotated[int | None, tyro.conf.arg(metavar="N", help_behavior_hint="(default: 1)")] = (
+        None
+    )
     """Show every Nth tick only."""
     step: Flag = False
     """Wait for Enter after each line; q ends."""
@@ -53,7 +60,9 @@ class ReplayOptions:
     set: Settings = ()
     """Compute the commands with other keys of the recorded scenario."""
     view: Flag = False
-    """Open a page with a time line instead; with --controller or --set it shows both."""
+    """Open the page whatever else is given; with --controller or --set it shows both."""
+    no_view: Flag = False
+    """Print lines, at a terminal too."""
     host: Annotated[str, tyro.conf.arg(metavar="A")] = "127.0.0.1"
     """Address that the page listens on."""
     port: Annotated[int, tyro.conf.arg(metavar="N")] = 8080
@@ -67,15 +76,18 @@ def replay_command(options: ReplayOptions, command: str) -> int:
     from proxcgal.sim.recording import read_recording
     from proxcgal.sim.replay import recorded_log
 
-    if options.every < 1:
-        raise ConfigError(f"--every {options.every}: must be 1 or more")
+    every = 1 if options.every is None else options.every
+    if every < 1:
+        raise ConfigError(f"--every {every}: must be 1 or more")
+    if options.view and options.no_view:
+        raise ConfigError("--view --no-view: a page or lines, not both")
     recording = read_recording(options.file)
     if recording.damage:
         print(f"proxcgal: {options.file}: damaged: {recording.damage}", file=sys.stderr)
     if not recording.ticks:
         raise ConfigError(f"{options.file}: holds no tick")
     changes = flat(options.set)
-    if options.view:
+    if opens_page(options, terminal=sys.stdout.isatty()):
         return _view(options, recording, changes)
     again = options.controller is not None or bool(changes)
     row = None if options.at is None else _row_at(recording, options.at)
@@ -85,11 +97,20 @@ def replay_command(options: ReplayOptions, command: str) -> int:
         _show_tick(shown.ticks[row])
         return 0
     log = recorded_log(shown)
-    _walk(_lines(log, shown.ticks, options.every), step=options.step)
+    _walk(_lines(log, shown.ticks, every), step=options.step)
     _print_summary(log)
     if again:
         _compare(recording, log)
     return 0
+
+
+def opens_page(options: ReplayOptions, *, terminal: bool) -> bool:
+    """A page, or lines? Whoever asks for nothing else at a terminal wants to look."""
+    lines = (
+        options.no_view or options.step or options.at is not None or options.every is not None
+        or options.controller is not None or flat(options.set)
+    )  # fmt: skip
+    return options.view or (terminal and not lines)
 
 
 def _view(options: ReplayOptions, recording: Recording, changes: Sequence[str]) -> int:
@@ -114,6 +135,8 @@ def _view(options: ReplayOptions, recording: Recording, changes: Sequence[str]) 
     try:
         print(words)
         print(address(options.host, server.get_port(), token), flush=True)
+        if sys.stdout.isatty():
+            print("Ctrl-C: end; with --no-view: lines here instead of the page", flush=True)
         threading.Event().wait()
     finally:
         page.close()

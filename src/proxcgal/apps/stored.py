@@ -35,6 +35,7 @@ class StoredSummary(_Stored):
     robot: str
     seed: int
     controllers: dict[str, Numbers]
+    closest_points: dict[str, dict[str, float | None]] = {}  # shares of `sim.coverage`
     gain_mm: float | None = None
     self_min_m: float | None = None
     failed: bool = False

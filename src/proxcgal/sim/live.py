@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,8 @@ from proxcgal.sim.setup import Setup
 from proxcgal.sim.source import SimulatedSource
 from proxcgal.sim.ticks import TickInput, TickResult
 from proxcgal.sim.truth import Truth
+from proxcgal.sim.walk.grip import HAND
+from proxcgal.sim.walk.guided import GuidedScenario, GuidedSource
 from proxcgal.sim.world import World
 
 Array = NDArray[np.float64]
@@ -61,11 +64,16 @@ class LiveTrial:
         self.off: frozenset[int] = frozenset()  #: rows of the sensors that are silent
         self.since = since
         self.controller = controller
-        scene = LiveScene(setup.scene, self.hands, since)
+        scene, measured, drawn = (
+            LiveScene(each, self.hands, since)
+            for each in (setup.scene, setup.measured, setup.drawn)
+        )
         self.setup = setup = replace(
             setup,
             scenario=scenario.model_copy(update={"duration": _ENDLESS}),
             scene=scene,
+            measured=measured,
+            drawn=drawn,
             q0=setup.q0 if q is None else np.array(q),
         )
         known = setup.known_cloud() if setup.uses_known_points(controller) else None
@@ -73,10 +81,13 @@ class LiveTrial:
         names = [mount.name for mount in setup.skin.mounts]
         self._faults = FaultInjector(scenario.faults, names, scenario.seed)
         world = World(setup.robot, scene) if known is None else None
-        self._source = source = SimulatedSource(setup, world, scenario.seed)
+        make = GuidedSource if isinstance(scenario, GuidedScenario) else SimulatedSource
+        self._source = source = make(setup, world, scenario.seed)
         if world is not None and scenario.skin.check_mounts and q is None:
             require_mounts(setup, source)
-        self._truth = Truth(setup.robot, scene)
+        if isinstance(source, GuidedSource) and q is not None:
+            source.take_over()  # its path began elsewhere
+        self._truth = Truth(setup.robot, measured)
         self._count = 0
         self._ticks = run_ticks(source, self.law, self._spoiled, known)
         self._last: tuple[TickInput, TickResult] | None = None
@@ -101,6 +112,11 @@ class LiveTrial:
         """Is the controller in STOP? Nothing that the trial is told leads out of it."""
         return self._last is not None and self._last[1].mode == STOP
 
+    @property
+    def cpu_us(self) -> float:
+        """Of the last tick's thread."""
+        return 0.0 if self._last is None else self._last[1].cpu_us
+
     def step(self) -> TickResult:
         """One tick."""
         self.hands.advance(self.period)
@@ -114,21 +130,44 @@ class LiveTrial:
             yield self.step()
 
     def move(self, name: str, wanted: Array) -> None:
-        """Has a hand take a solid to a pose (4, 4) T_WO; unknown names are passed over."""
-        if name in self.setup.scene.names:
+        """Has a hand take a solid to a pose (4, 4) T_WO; unknown names are passed over.
+
+        `HAND`, of a guided arm, is the hand at the tool: it no longer goes its own way then.
+        """
+        if name == HAND and isinstance(self._source, GuidedSource):
+            self._source.take_over().move(self._tool(), wanted)
+        elif name in self.setup.scene.names:
             row = self.setup.scene.names.index(name)
             now = self.setup.scene.poses(max(self._count - 1, 0) * self.period)[row]
             self.hands.move(name, now, wanted)
+
+    def release(self) -> None:
+        """Lets go of all that is held."""
+        self.hands.release()
+        if isinstance(self._source, GuidedSource) and self._source.grip is not None:
+            self._source.grip.let_go()
 
     def moment(self) -> Moment:
         """What there is to see now, the true distance with it."""
         assert self._last is not None, "step() comes first"
         given, result = self._last
         now = (self._count - 1) * self.period
-        true = self._truth(self._source.q, now).distance
+        true = self._truth.nearest(self._source.q, now).distance
         return Moment.of(
-            self.setup, given, result, self.law, now, true=true, since=self.since, off=self.off
-        )
+            self.setup, given, result, self.law, now, true=true, since=self.since, off=self.off,
+            **self._hand(),
+        )  # fmt: skip
+
+    def _hand(self) -> dict[str, Any]:
+        """The hand at the tool of a guided arm: where it is, and whether somebody holds it."""
+        if not isinstance(self._source, GuidedSource):
+            return {}
+        grip = self._source.grip
+        pose = None if grip is None else grip.pose
+        return {"hand_W": self._tool() if pose is None else pose, "gripped": pose is not None}
+
+    def _tool(self) -> Array:
+        return np.array(self.setup.robot.tool_pose(self._source.q))
 
     def _spoiled(self, given: TickInput) -> TickInput:
         """What the controller gets: the scenario's faults, and nothing of silent sensors."""

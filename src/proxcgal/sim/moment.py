@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Self
 
 import numpy as np
@@ -19,20 +19,38 @@ Points = NDArray[np.float32]
 MODES = ("RUN", "DEGRADED", "HOLD", "STOP")
 
 
+def _no_points() -> Points:
+    return np.empty((0, 3), np.float32)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Moment:
-    """What one tick looked like."""
+class Posed:
+    """Where everything is."""
 
     elapsed: float  #: [s] of the run
     q: Array  #: (n_q,)
     links_W: Array  #: (links, 4, 4) T_WL
     solids_W: Array  #: (solids, 4, 4) T_WO
-    goal_W: Array  #: (4, 4) T_WT
-    kept_W: Points  #: (n, 3) the filtered cloud, without `held_W` [m]
-    held_W: Points  #: (n, 3) of it, what sensors that are silent now saw last [m]
-    removed_W: Points  #: (n, 3) of the raw cloud, what was taken for the arm [m]
-    control_W: tuple[float, ...] | None  #: (3,) the point that avoidance moves
-    obstacle_W: tuple[float, ...] | None  #: (3,) the point that it moves away from
+    goal_W: Array | None  #: (4, 4) T_WT; None: there is none to draw
+    hand_W: Array | None = None  #: (4, 4) of the hand at the tool, held or not; None: there is none
+    gripped: bool = False  #: does somebody who looks on hold that hand?
+    kept_W: Points = field(
+        default_factory=_no_points
+    )  #: (n, 3) the filtered cloud, without `held_W` [m]
+    held_W: Points = field(
+        default_factory=_no_points
+    )  #: (n, 3) of it, what sensors that are silent now saw last [m]
+    removed_W: Points = field(
+        default_factory=_no_points
+    )  #: (n, 3) of the raw cloud, what was taken for the arm [m]
+    control_W: tuple[float, ...] | None = None  #: (3,) where the arrow begins
+    obstacle_W: tuple[float, ...] | None = None  #: (3,) where it points to
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Moment(Posed):
+    """What one tick looked like; the arrow goes from what avoidance moves to what it avoids."""
+
     link: str  #: that avoidance moves
     seen: float  #: [m] cloud to robot
     true: float  #: [m] scene to robot
@@ -54,6 +72,8 @@ class Moment:
         true: float,
         since: float = 0.0,
         off: Collection[int] = (),
+        hand_W: Array | None = None,
+        gripped: bool = False,
     ) -> Self:
         """Of a tick that `law` has just made.
 
@@ -66,6 +86,8 @@ class Moment:
             true: distance from scene to robot [m].
             since: added to `time` in what is shown [s].
             off: rows of the sensors that are silent.
+            hand_W: (4, 4) of a hand at the tool.
+            gripped: somebody who looks on holds it.
         """
         kept, raw, held = np.empty((0, 3)), np.empty((0, 3)), np.empty(0, bool)
         if law is not None:
@@ -75,8 +97,10 @@ class Moment:
             elapsed=since + time,
             q=given.q,
             links_W=np.asarray(setup.robot.link_poses(given.q)),
-            solids_W=np.asarray(setup.scene.poses(time)),
+            solids_W=np.asarray(setup.drawn.poses(time)),
             goal_W=given.goal,
+            hand_W=hand_W,
+            gripped=gripped,
             kept_W=kept[~held].astype(np.float32),
             held_W=kept[held].astype(np.float32),
             removed_W=without(raw, kept).astype(np.float32),

@@ -189,6 +189,11 @@ class _Contents:
         if metadata.name != SETTINGS:
             raise ValueError(f"unknown metadata {metadata.name!r}")
         content = dict(metadata.metadata)
+        if not {"crc", "controller"} & content.keys():
+            raise RecordingError(
+                f"recording {self._path}: holds the poses of a walk-through, and no controller's "
+                "ticks; path.csv beside it has the path, and Foxglove shows it"
+            )
         if content.pop("crc", None) != settings_crc(content):
             raise ValueError("the settings' checksum does not fit")
         if content["format"] != FORMAT:

@@ -32,6 +32,7 @@ class Setup:
     goals: tuple[Array, ...]  #: (4, 4) T_WT each, in the order of their turn
     scene: Scene  #: what sensors see and known points lie on
     measured: Scene  #: what true distances run to
+    drawn: Scene  #: all that is there
 
     @classmethod
     def of(cls, scenario: Scenario, robot: Robot | None = None) -> Self:
@@ -46,7 +47,7 @@ class Setup:
         return cls(
             scenario=scenario, robot=robot, skin=make_skin(scenario, robot), q0=q0,
             goals=_goals(scenario, robot, q0), scene=scenario.scene(),
-            measured=scenario.measured(),
+            measured=scenario.measured(), drawn=scenario.drawn(),
         )  # fmt: skip
 
     @property

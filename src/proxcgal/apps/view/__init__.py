@@ -16,15 +16,15 @@ from proxcgal.errors import ConfigError
 
 if TYPE_CHECKING:
     from proxcgal.apps.view.live import LivePage
+    from proxcgal.sim.scenario import Scenario
 
 LOCAL = "127.0.0.1"
 PORT = 8080
-_NOT_LIVE = frozenset({"walkthrough"})
 
 
 @dataclass(frozen=True)
 class ViewOptions:
-    """Simulate a scene in real time and look at it in the browser: drag the obstacle.
+    """Simulate a scene in real time and look at it in the browser: drag the obstacle, or the hand.
 
     Only this machine can open the page, unless --host says otherwise; then a token is needed, which
     is part of the address that is printed.
@@ -32,13 +32,17 @@ class ViewOptions:
     Examples:
       proxcgal view front_plane
       proxcgal view side_plane --controller sm --port 8090
+      proxcgal view walkthrough_teach
       proxcgal view front_plane --host 0.0.0.0 --token a-long-secret
     """
 
     scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO")]
     """A name that `proxcgal scenarios` lists, or a path to a TOML file."""
-    controller: Annotated[ControllerName, tyro.conf.arg(metavar="wb|sm|wb_known|wb_memory")] = "wb"
-    """The law that begins; the page can change it."""
+    controller: Annotated[
+        ControllerName | None,
+        tyro.conf.arg(metavar="wb|sm|wb_known|wb_memory", help_behavior_hint="(default: wb)"),
+    ] = None
+    """The law that begins; the page can change it. A walk-through has none."""
     set: Settings = ()
     """Change keys of the scenario, values as in TOML: controller.d_min=0.25"""
     host: Annotated[str, tyro.conf.arg(metavar="A")] = LOCAL
@@ -51,23 +55,17 @@ class ViewOptions:
 
 def view_command(options: ViewOptions, command: str) -> int:
     """Serves until interrupted; prints the page's address."""
-    from proxcgal.apps.results import check
     from proxcgal.apps.view.gate import close, serve
     from proxcgal.apps.view.live import LivePage
     from proxcgal.sim.scenario import load_scenario
 
-    scenario = load_scenario(options.scenario, flat(options.set))
-    if scenario.kind in _NOT_LIVE:
-        raise ConfigError(
-            f"scenario {scenario.name}: kind = {scenario.kind!r} has physics of its own, which the "
-            "live page does not run"
-        )
     token = checked_token(options.host, options.port, options.token)
-    check(scenario, [options.controller])
+    scenario = load_scenario(options.scenario, flat(options.set))
+    _check(scenario, options.controller)
     server, gate = serve(
         options.host, options.port, label=f"proxcgal: {scenario.name}", token=token
     )
-    page = LivePage(server, gate, scenario, options.controller)
+    page = LivePage(server, gate, scenario, options.controller or "wb")
     os.nice(5)  # the page yields to the simulation, which has its process by now
     try:
         print(address(options.host, server.get_port(), token), flush=True)
@@ -76,6 +74,27 @@ def view_command(options: ViewOptions, command: str) -> int:
         page.close()
         close(server)
     return 0
+
+
+def _check(scenario: Scenario, controller: str | None) -> None:
+    """Does it fit? A walk-through's guard says what it monitors and what was accepted.
+
+    Raises:
+        ConfigError: what does not.
+    """
+    from proxcgal.apps.results import check
+    from proxcgal.sim.walk.keys import WalkScenario
+    from proxcgal.sim.walk.setup import WalkSetup
+
+    if not isinstance(scenario, WalkScenario):
+        check(scenario, [controller or "wb"])
+        return
+    if controller is not None:
+        raise ConfigError(
+            f'--controller {controller}: {scenario.name} has kind = "walkthrough", where a hand '
+            "guides the arm: no controllers to choose from"
+        )
+    print("\n".join(WalkSetup.of(scenario).told()))
 
 
 def checked_token(host: str, port: int, token: str | None) -> str | None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from proxcgal.apps.view.simulation import Wishes
+from proxcgal.apps.view.exchange import Wishes
 
 Array = NDArray[np.float64]
 

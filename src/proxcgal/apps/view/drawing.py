@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from proxcgal.apps.view.stage import Stage
 from proxcgal.sim.frames import placed
-from proxcgal.sim.moment import Moment
+from proxcgal.sim.moment import Posed
 from proxcgal.sim.solids import Box, Capsule, Cylinder, Solid, Sphere
 
 Array = NDArray[np.float64]
@@ -26,6 +26,7 @@ REMOVED: Color = (66, 120, 240)
 PAIR: Color = (16, 150, 60)
 GHOST_PAIR: Color = (220, 120, 20)
 SOLID: Color = (250, 186, 92)
+UNSENSED: Color = (176, 182, 190)
 SENSOR: Color = (250, 204, 40)
 SILENT: Color = (120, 120, 120)
 _VIEW: Color = (214, 176, 60)
@@ -59,7 +60,12 @@ class Drawing:
         if not ghost:
             self._views = self._sensors()
             self._solids = [
-                _solid(scene, f"{name}/scene/{row}_{label}", solid)
+                _solid(
+                    scene,
+                    f"{name}/scene/{row}_{label}",
+                    solid,
+                    SOLID if label in stage.sensed else UNSENSED,
+                )
                 for row, (label, solid) in enumerate(zip(stage.names, stage.solids, strict=True))
             ]
             self._place(self._solids, stage.solids_W)
@@ -74,7 +80,7 @@ class Drawing:
             **_SHAFT,
         )  # fmt: skip
 
-    def show(self, moment: Moment) -> None:
+    def show(self, moment: Posed) -> None:
         """Moves everything to where it is at that moment."""
         self._place(self._links, moment.links_W)
         self._pair(moment)
@@ -84,8 +90,9 @@ class Drawing:
         self._points(self._kept, moment.kept_W)
         self._points(self._held, moment.held_W)
         self._points(self._removed, moment.removed_W)
-        self._put(self._goal, moment.goal_W)
-        _shown(self._goal, True)
+        _shown(self._goal, moment.goal_W is not None)
+        if moment.goal_W is not None:
+            self._put(self._goal, moment.goal_W)
 
     def silence(self, off: Collection[int]) -> None:
         """Greys out the sensors of these rows, and no others."""
@@ -164,7 +171,7 @@ class Drawing:
         if on and len(points_W):
             cloud.points = points_W.astype(np.float16)
 
-    def _pair(self, moment: Moment) -> None:
+    def _pair(self, moment: Posed) -> None:
         pair = moment.control_W, moment.obstacle_W
         there = pair[0] is not None and pair[1] is not None
         _shown(self._arrow, there)
@@ -240,9 +247,9 @@ def viewpoint(stage: Stage) -> tuple[Array, Array]:
     return target + (0.9 + 1.2 * reach) * away / np.linalg.norm(away), target
 
 
-def _solid(scene: viser.SceneApi, name: str, solid: Solid) -> Any:
+def _solid(scene: viser.SceneApi, name: str, solid: Solid, color: Color) -> Any:
     plain: dict[str, Any] = {
-        "color": SOLID,
+        "color": color,
         "opacity": 0.45 if solid.extent.max() < _WALL else 0.06,
         "cast_shadow": False,
         "receive_shadow": False,

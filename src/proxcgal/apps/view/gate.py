@@ -252,7 +252,10 @@ def _check_free(host: str, port: int) -> None:
             probe.bind(address)
     except (OSError, UnicodeError, OverflowError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise ConfigError(f"--host {host} --port {port}: cannot be listened on: {reason}") from None
+        free = "; --port 0 takes any that is free" if port else ""
+        raise ConfigError(
+            f"--host {host} --port {port}: cannot be listened on: {reason}{free}"
+        ) from None
 
 
 def _upgrades(request: Request) -> bool:

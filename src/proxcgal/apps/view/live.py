@@ -13,9 +13,11 @@ import viser
 from proxcgal.apps.view.controls import Controls
 from proxcgal.apps.view.desk import Desk
 from proxcgal.apps.view.drawing import Drawing, furnish
+from proxcgal.apps.view.exchange import Told
 from proxcgal.apps.view.gate import Gate
 from proxcgal.apps.view.preparation import Preparation
-from proxcgal.apps.view.simulation import FRAME_HZ, Told, simulate
+from proxcgal.apps.view.simulation import FRAME_HZ, is_walk, simulate
+from proxcgal.apps.view.walk_panel import WalkPanel
 from proxcgal.errors import SimulationError
 from proxcgal.sim.scenario import Scenario
 
@@ -49,7 +51,11 @@ class LivePage:
         self.drawn = 0  #: moments so far
         self.bounds = (0.0, 0.0)  #: d_min and buffer of the law [m]
         self._server = server
-        self._controls = Controls(server, gate, self.desk, scenario, controller)
+        self._controls: Controls | WalkPanel = (
+            WalkPanel(server, gate, self.desk, scenario)
+            if is_walk(scenario)
+            else Controls(server, gate, self.desk, scenario, controller)
+        )
         self._drawing: Drawing | None = None
         self._shown: tuple[object, ...] = ()
         self._note, self._noted = "", 0.0
@@ -125,7 +131,7 @@ class LivePage:
             self._controls.status(Told(), f"the simulation has ended: {told.failed}")
         if told.note:
             self._tell(told.note)
-        if told.stage is not None and told.choice is not None:
+        if told.stage is not None:
             self._waiting = False
             self._note = ""
             if self._drawing is None or self._drawing.stage.key != told.stage.key:
@@ -156,7 +162,7 @@ class LivePage:
             self._shown = shown
         drawing.show(told.moment)
         self.drawn += 1
-        self._controls.told(told, drawing)
+        self._controls.told(told)
         self._controls.plots.add(told.moment)
         now = clock.monotonic()
         if now >= self._plotted + 1.0 / PLOT_HZ:

@@ -12,7 +12,7 @@ import viser.uplot
 from numpy.typing import NDArray
 
 from proxcgal.apps.view.stage import Stage
-from proxcgal.sim.moment import Moment
+from proxcgal.sim.moment import Moment, Posed
 
 Array = NDArray[np.float64]
 Curve = tuple[str, str, tuple[int, ...]]  # label, colour, dashes [px]
@@ -32,8 +32,9 @@ class Plots:
         self._distance = _distances(gui, ("seen", _SEEN, ()), ("true", _TRUE, (5, 4)))
         self._activation = _activations(gui, ("activation", _GREEN, ()))
 
-    def add(self, moment: Moment) -> None:
+    def add(self, moment: Posed) -> None:
         """One moment more; a time before the last one begins anew."""
+        assert isinstance(moment, Moment)
         if self._rows and moment.elapsed < self._rows[-1][0]:
             self._rows.clear()
         if self._rows and moment.elapsed == self._rows[-1][0]:
@@ -62,9 +63,9 @@ def whole_run(
     if again is not None:
         curves.append(("seen, recomputed", _ORANGE, ()))
         distances.append([m.seen for m in again])
-    plot = _distances(gui, *curves)
+    chart = _distances(gui, *curves)
     bounds = [np.full_like(time, stage.d_min), np.full_like(time, stage.d_min + stage.buffer)]
-    plot.data = (time, *(_drawn(np.array(each)) for each in distances), *bounds)
+    chart.data = (time, *(_drawn(np.array(each)) for each in distances), *bounds)
     curves = [("activation", _GREEN, ())]
     activations = [np.array([m.activation for m in moments])]
     if again is not None:
@@ -75,14 +76,15 @@ def whole_run(
 
 def _distances(gui: viser.GuiApi, *curves: Curve) -> Any:
     bounds: list[Curve] = [("d_min", _BOUND, (2, 3)), ("d_min + buffer", _BOUND, (2, 3))]
-    return _plot(gui, "distance [m], time [s]", HIGHEST, _HEIGHT, *curves, *bounds)
+    return plot(gui, "distance [m], time [s]", HIGHEST, _HEIGHT, *curves, *bounds)
 
 
 def _activations(gui: viser.GuiApi, *curves: Curve) -> Any:
-    return _plot(gui, "activation of avoidance, time [s]", 1.0, _HEIGHT - 45, *curves)
+    return plot(gui, "activation of avoidance, time [s]", 1.0, _HEIGHT - 45, *curves)
 
 
-def _plot(gui: viser.GuiApi, title: str, highest: float, height: int, *curves: Curve) -> Any:
+def plot(gui: viser.GuiApi, title: str, highest: float, height: int, *curves: Curve) -> Any:
+    """An empty plot over time; what is higher than `highest` is drawn there."""
     nothing = np.array([0.0, SPAN])
     return gui.add_uplot(
         (nothing,) * (1 + len(curves)),
@@ -97,9 +99,9 @@ def _plot(gui: viser.GuiApi, title: str, highest: float, height: int, *curves: C
         height=height,
         scales={
             "x": viser.uplot.Scale(time=False, auto=True),
-            "y": viser.uplot.Scale(auto=False, range=(0.0, highest)),
+            "y": viser.uplot.Scale(auto=False, range=(0.0, 1.04 * highest)),
         },
-        axes=(viser.uplot.Axis(size=28), viser.uplot.Axis(size=40)),
+        axes=(viser.uplot.Axis(size=28), viser.uplot.Axis(size=46)),
         legend={"show": len(curves) > 1, "live": False},
     )
 

@@ -7,65 +7,36 @@ STOP: only whoever started the command begins anew then.
 
 from __future__ import annotations
 
-import contextlib
-import threading
 import time as clock
 from collections import deque
 from collections.abc import Iterable
-from dataclasses import dataclass
 from multiprocessing.connection import Connection
+from typing import TypeGuard
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxcgal.apps.view.choice import Choice
+from proxcgal.apps.view.exchange import Outbox, Told, Wishes
 from proxcgal.apps.view.stage import Stage
 from proxcgal.errors import ProxError
 from proxcgal.sim.live import LiveTrial
-from proxcgal.sim.moment import Moment
 from proxcgal.sim.scenario import Scenario
-
-Array = NDArray[np.float64]
+from proxcgal.sim.walk.keys import WalkScenario
+from proxcgal.sim.walk.live import WalkTrial
 
 FRAME_HZ = 15.0  #: moments that are offered to the page
 LOST = 0.1  #: [s] behind real time from which what is lost stays lost
 _LATENESS = 1000  # ticks that the lateness is told of
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Wishes:
-    """What a page wants since it last spoke; what it does not want anew is None."""
-
-    running: bool | None = None
-    steps: int = 0  #: ticks, while it does not run
-    reset: bool = False  #: the arm back to its start, the time to 0
-    hands: tuple[tuple[str, Array], ...] = ()  #: (4, 4) T_WO that each of these solids is to go to
-    release: bool = False  #: all solids
-    off: frozenset[int] | None = None  #: rows of the sensors that are silent
-    choice: Choice | None = None
-    anew: bool = False  #: as `reset`, out of a STOP too: never from a message of a page
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Told:
-    """What the simulation tells a page."""
-
-    moment: Moment | None = None
-    stage: Stage | None = None  #: where it is another one
-    choice: Choice | None = None  #: with the stage: what it was made with
-    refused: bool = False  #: with the choice: another one was wanted, and could not be
-    note: str = ""  #: what could not be done, or is being done
-    late_us: tuple[float, float] = (0.0, 0.0)  #: of the last ticks' wake-ups: median and p99
-    cpu_us: float = 0.0  #: median thread CPU of the last ticks
-    real_time: float = 1.0  #: simulated seconds in one
-    dropped: int = 0  #: moments that the page did not take, so far
-    running: bool = True
-    failed: str = ""  #: why the simulation has ended
+def is_walk(scenario: Scenario) -> TypeGuard[WalkScenario]:
+    """Is it the walk-through cell, which has a guard and no law to choose?"""
+    return isinstance(scenario, WalkScenario)
 
 
 def simulate(link: Connection, scenario: Scenario, controller: str, hz: float = FRAME_HZ) -> None:
     """Runs until the other end of `link` is closed; the target of a process."""
-    outbox = _Outbox(link)
+    outbox = Outbox(link)
     try:
         _Simulation(outbox, link, scenario, controller, hz).run()
     except (EOFError, BrokenPipeError, ConnectionResetError, KeyboardInterrupt):
@@ -79,77 +50,22 @@ def simulate(link: Connection, scenario: Scenario, controller: str, hz: float = 
         outbox.close()
 
 
-class _Outbox:
-    """One moment at a time, the newest; notes and stages all. Sent by a thread of its own."""
-
-    def __init__(self, link: Connection) -> None:
-        self._link = link
-        self._wake = threading.Condition()
-        self._sure: deque[Told] = deque()
-        self._newest: Told | None = None
-        self._free = True  # the page has taken the last moment
-        self._closed = False
-        self.dropped = 0
-        self._thread = threading.Thread(target=self._send, daemon=True)
-        self._thread.start()
-
-    def offer(self, told: Told) -> None:
-        """Takes the place of what was not sent yet."""
-        with self._wake:
-            self.dropped += self._newest is not None
-            self._newest = told
-            self._wake.notify()
-
-    def tell(self, told: Told) -> None:
-        """Sent whatever happens."""
-        with self._wake:
-            self._sure.append(told)
-            self._newest = None  # older than what is told now
-            self._wake.notify()
-
-    def taken(self) -> None:
-        """The page has drawn what it got."""
-        with self._wake:
-            self._free = True
-            self._wake.notify()
-
-    def close(self) -> None:
-        """What was told is sent, nothing after it, and the thread ends."""
-        with self._wake:
-            self._closed = True
-            self._wake.notify()
-        self._thread.join(timeout=2.0)
-
-    def _send(self) -> None:
-        with contextlib.suppress(OSError, EOFError):
-            while True:
-                with self._wake:
-                    self._wake.wait_for(
-                        lambda: self._sure or self._closed or (self._free and self._newest)
-                    )
-                    if self._sure:
-                        told: Told | None = self._sure.popleft()
-                    elif self._closed:
-                        return
-                    else:
-                        told, self._newest, self._free = self._newest, None, False
-                self._link.send(told)
-
-
 class _Simulation:
     """The loop."""
 
     def __init__(
-        self, outbox: _Outbox, link: Connection, scenario: Scenario, controller: str, hz: float
+        self, outbox: Outbox, link: Connection, scenario: Scenario, controller: str, hz: float
     ) -> None:
         self._outbox = outbox
         self._link = link
         self._base = scenario
-        self._choice = Choice.of(scenario, controller)
+        self._choice = None if is_walk(scenario) else Choice.of(scenario, controller)
         self._frame = 1.0 / hz
         self._off: frozenset[int] = frozenset()
         self._running = True
-        self._trial = LiveTrial(scenario, controller)
+        self._trial: LiveTrial | WalkTrial = (
+            WalkTrial(scenario) if is_walk(scenario) else LiveTrial(scenario, controller)
+        )
         self._fresh()
         self._stage()
 
@@ -195,41 +111,66 @@ class _Simulation:
         """Does what is wanted; how many single ticks are still to be made."""
         stopped = self._trial.stopped
         if wishes.anew or (wishes.reset and not stopped):
-            self._anew(self._choice, keep=False)
+            self._restart()
         elif wishes.reset or (wishes.choice is not None and stopped):
-            self._note("the controller has stopped: only a reset where `proxcgal view` runs helps")
+            self._note(f"{self._latched}: only Enter where `proxcgal view` runs leads out of it")
         if wishes.choice is not None and not stopped and wishes.choice != self._choice:
-            try:
-                self._anew(wishes.choice, keep=wishes.choice.robot == self._choice.robot)
-                self._choice = wishes.choice
-                self._stage()
-            except ProxError as error:
-                self._note(str(error))
-                self._stage(refused=True)
+            self._choose(wishes.choice)
         if wishes.running is not None:
             self._running = wishes.running
         if wishes.release:
-            self._trial.hands.release()
+            self._trial.release()
         for name, pose in wishes.hands:
             self._trial.move(name, pose)
         if wishes.off is not None:
-            self._off = self._trial.off = wishes.off
+            self._off = wishes.off
+            if isinstance(self._trial, LiveTrial):
+                self._trial.off = wishes.off
+        if wishes.enable and isinstance(self._trial, WalkTrial):
+            self._trial.enable()
         return 0 if self._running else min(wishes.steps, 100)
 
-    def _anew(self, choice: Choice, *, keep: bool) -> None:
-        """Another trial, at rest; `keep`: where the arm is, at the same time."""
+    @property
+    def _latched(self) -> str:
+        if isinstance(self._trial, WalkTrial):
+            return "a stop took longer than the guard declares"
+        return "the controller has stopped"
+
+    def _restart(self) -> None:
+        """The arm at its start, the time at 0."""
         old = self._trial
-        scenario = choice.applied(self._base)
-        same = (choice.robot, choice.vertices) == (self._choice.robot, self._choice.vertices)
-        self._trial = LiveTrial(
-            scenario, choice.controller, robot=old.setup.robot if same else None,
-            q=old.q if keep else None, hands=old.hands if keep else None,
-            since=old.elapsed if keep else 0.0,
-        )  # fmt: skip
-        if choice.robot != self._choice.robot:
+        if isinstance(old, WalkTrial):
+            self._trial = old.again()
+        else:
+            assert self._choice is not None
+            scenario = self._choice.applied(self._base)
+            self._trial = LiveTrial(scenario, self._choice.controller, robot=old.setup.robot)
+            self._trial.off = self._off
+        self._fresh()
+
+    def _choose(self, choice: Choice) -> None:
+        """Another law or robot, at rest: where the arm is, where that is the same robot."""
+        old, own = self._trial, self._choice
+        if not isinstance(old, LiveTrial) or own is None:
+            return
+        same = (choice.robot, choice.vertices) == (own.robot, own.vertices)
+        keep = choice.robot == own.robot
+        try:
+            self._trial = LiveTrial(
+                choice.applied(self._base), choice.controller,
+                robot=old.setup.robot if same else None, q=old.q if keep else None,
+                hands=old.hands if keep else None, since=old.elapsed if keep else 0.0,
+            )  # fmt: skip
+        except ProxError as error:
+            self._note(str(error))
+            self._stage(refused=True)
+            return
+        if not keep:
             self._off = frozenset()
         self._trial.off = self._off
+        self._choice = choice
         self._fresh()
+        self._stage()
 
     def _fresh(self) -> None:
         self._late: deque[float] = deque(maxlen=_LATENESS)
@@ -239,7 +180,8 @@ class _Simulation:
     def _tick(self, late: float | None) -> None:
         if late is not None:
             self._late.append(1e6 * late)
-        self._cpu.append(self._trial.step().cpu_us)
+        self._trial.step()
+        self._cpu.append(self._trial.cpu_us)
 
     def _show(self, real_time: float) -> None:
         late = np.array(self._late or [0.0])
@@ -253,7 +195,8 @@ class _Simulation:
         )  # fmt: skip
 
     def _stage(self, *, refused: bool = False) -> None:
-        stage = Stage.of(self._trial.setup)
+        trial = self._trial
+        stage = Stage.of_walk(trial) if isinstance(trial, WalkTrial) else Stage.of(trial.setup)
         self._outbox.tell(
             Told(stage=stage, choice=self._choice, running=self._running, refused=refused)
         )

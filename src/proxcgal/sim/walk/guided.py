@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from proxcgal import _core
 from proxcgal.sim.source import SimulatedSource
 from proxcgal.sim.ticks import TickInput
+from proxcgal.sim.walk.grip import Grip
 from proxcgal.sim.walk.hand import Hand, rotation_of
 from proxcgal.sim.walk.keys import GuidedScenario
 from proxcgal.sim.walk.wish import Wish
@@ -45,6 +46,9 @@ class GuidedSource(SimulatedSource):
         self._cycle = 0
         self._twist = np.zeros(6)
         self._J = np.zeros((6, setup.robot.n_q))
+        self._keys = scenario.hand
+        #: A hand that somebody moves, in place of the one with a path in mind.
+        self.grip: Grip | None = None
 
     def read(self) -> TickInput | None:
         """The next tick's inputs: the goal is one step of the hand ahead of the tool."""
@@ -53,13 +57,23 @@ class GuidedSource(SimulatedSource):
             return None
         T = np.array(self._robot.tool_pose(given.q))
         self._J = np.array(self._robot.tool_jacobian(given.q))
-        force = self._hand.force(self._cycle, T[:3, 3], T[:3, :3], self._twist)
-        wanted = np.array(self._admittance.step(force, True, self._pace))
+        tool = T[:3, 3], T[:3, :3], self._twist
+        if self.grip is None:
+            force, engaged = self._hand.force(self._cycle, *tool), True
+        else:
+            force, engaged = self.grip.force(*tool), self.grip.holds
+        wanted = np.array(self._admittance.step(force, engaged, self._pace))
         self._cycle += 1
         goal = T.copy()
         goal[:3, 3] += wanted[:3] / self._gain
         goal[:3, :3] = rotation_of(wanted[3:] / self._gain) @ T[:3, :3]
         return replace(given, goal=goal)
+
+    def take_over(self) -> Grip:
+        """The hand that somebody moves from now on; it holds nothing yet."""
+        if self.grip is None:
+            self.grip = Grip(self._keys, self._pace)
+        return self.grip
 
     def command(self, qd: Array) -> None:
         """Velocity until the next tick (n_q,); the hand feels what became of its pull."""

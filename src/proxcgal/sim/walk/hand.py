@@ -17,24 +17,84 @@ _TONES = 6  # sinusoids of random frequency and phase that make a tremor
 _LETTING_GO = 0.10  # [s] in which a hand that has noticed the stop lets go
 
 
+class Pull:
+    """Spring and damper between the tool and where a hand wants it, bounded.
+
+    Once the arm has stopped it goes on for the reaction time, and then lets go.
+    """
+
+    def __init__(self, keys: HandKeys, period: float) -> None:
+        """Args: one step takes `period` [s]."""
+        self._keys = keys
+        self._period = period
+        self._delay = round(keys.reaction_time / period)
+        self._stopped_for = 0
+        self._force = np.zeros(6)
+
+    @property
+    def delay(self) -> int:
+        """Steps of the reaction time."""
+        return self._delay
+
+    @property
+    def gone(self) -> bool:
+        """Has it let go, after a stop?"""
+        return self._held() <= 0.0
+
+    def force(
+        self,
+        tool: tuple[Array, Array, Array],
+        position: Array,
+        rotation: Array,
+        twist: Array,
+        extra: Array | None = None,
+    ) -> Array:
+        """What it does at the tool's origin (6,), in world [N], [N m]; reused, copy what you keep.
+
+        Args:
+            tool: where that is: (3,) [m], (3, 3) R_WT, (6,) twist, linear first [m/s], [rad/s].
+            position: (3,) where it is wanted [m].
+            rotation: (3, 3) R_WT wanted.
+            twist: (6,) of what is wanted [m/s], [rad/s].
+            extra: (3,) beside spring and damper [N].
+        """
+        keys, force = self._keys, self._force
+        force[:3] = keys.stiffness * (position - tool[0])
+        force[:3] += keys.damping * (twist[:3] - tool[2][:3])
+        if extra is not None:
+            force[:3] += extra
+        force[3:] = keys.turn_stiffness * _turn_between(tool[1], rotation)
+        force[3:] += keys.turn_damping * (twist[3:] - tool[2][3:])
+        _bound(force[:3], keys.max_force)
+        _bound(force[3:], keys.max_torque)
+        if self._stopped_for > self._delay:
+            force *= max(self._held(), 0.0)
+        return force
+
+    def feel_stop(self) -> None:
+        """The arm does not follow, for one more step."""
+        self._stopped_for += 1
+
+    def _held(self) -> float:
+        """Share of the force that a hand has left which notices a stop."""
+        return 1.0 - (self._stopped_for - self._delay) * self._period / _LETTING_GO
+
+
 class Hand:
     """Pulls the tool along a wished path; lets go once it has noticed that the arm has stopped."""
 
     def __init__(self, keys: HandKeys, wish: Wish, start: Array, period: float, seed: int) -> None:
         """Args: `start` (4, 4) T_WT where the path begins; the seed fixes the tremor."""
-        self._keys = keys
+        self._pull = Pull(keys, period)
         self._wish = wish
         self._start = np.array(start)
-        self._period = period
-        self._delay = round(keys.reaction_time / period)
-        self._tremor = _tremor(len(wish) + self._delay, period, keys.tremor, seed)
-        self._stopped_for = 0
-        self._force = np.zeros(6)
+        self._twist = np.zeros(6)
+        self._tremor = _tremor(len(wish) + self._pull.delay, period, keys.tremor, seed)
 
     @property
     def cycles(self) -> int:
         """From the signal to start until the path's end."""
-        return len(self._wish) + self._delay
+        return len(self._wish) + self._pull.delay
 
     def force(self, cycle: int, position: Array, rotation: Array, twist: Array) -> Array:
         """What it does at the tool's origin (6,), in world [N], [N m].
@@ -45,25 +105,18 @@ class Hand:
             rotation: (3, 3) R_WT.
             twist: (6,) of the tool, linear first [m/s], [rad/s].
         """
-        keys, wish = self._keys, self._wish
-        row = min(max(cycle - self._delay, 0), len(wish) - 1)
-        force = self._force
-        force[:3] = keys.stiffness * (self._start[:3, 3] + wish.position[row] - position)
-        force[:3] += keys.damping * (wish.velocity[row] - twist[:3])
-        force[:3] += self._tremor[min(cycle, len(self._tremor) - 1)]
-        wanted = rotation_of(wish.turn[row]) @ self._start[:3, :3]
-        force[3:] = keys.turn_stiffness * _turn_between(rotation, wanted)
-        force[3:] += keys.turn_damping * (wish.spin[row] - twist[3:])
-        _bound(force[:3], keys.max_force)
-        _bound(force[3:], keys.max_torque)
-        if self._stopped_for > self._delay:
-            held = 1.0 - (self._stopped_for - self._delay) * self._period / _LETTING_GO
-            force *= max(held, 0.0)
-        return force
+        wish = self._wish
+        row = min(max(cycle - self._pull.delay, 0), len(wish) - 1)
+        self._twist[:3], self._twist[3:] = wish.velocity[row], wish.spin[row]
+        return self._pull.force(
+            (position, rotation, twist), self._start[:3, 3] + wish.position[row],
+            rotation_of(wish.turn[row]) @ self._start[:3, :3], self._twist,
+            self._tremor[min(cycle, len(self._tremor) - 1)],
+        )  # fmt: skip
 
     def feel_stop(self) -> None:
         """The arm does not follow, for one more cycle."""
-        self._stopped_for += 1
+        self._pull.feel_stop()
 
 
 def _bound(vector: Array, most: float) -> None:

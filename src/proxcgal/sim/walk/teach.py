@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from proxcgal.errors import ConfigError
+from proxcgal.sim.walk.cell import Cell
 from proxcgal.sim.walk.hand import Hand
 from proxcgal.sim.walk.keys import WalkScenario
 from proxcgal.sim.walk.log import WalkLog
@@ -58,7 +59,8 @@ def teach(
         SimulationError: MuJoCo warned.
     """
     scenario = setup.scenario
-    guard, guide, physics = setup.make_guard(), setup.make_guide(), setup.make_physics()
+    cell = Cell(setup)
+    physics, bounds = cell.physics, cell.bounds
     wish = Wish.of(scenario.legs, PERIOD)
     start = np.array(setup.robot.tool_pose(setup.q0))
     hand = Hand(scenario.hand, wish, start, PERIOD, seed)
@@ -66,32 +68,25 @@ def teach(
     release = begin + hand.cycles + round(SETTLE / PERIOD)
     cycles = min(release + round(SETTLE / PERIOD), round(scenario.duration / PERIOD))
     log = WalkLog.empty(cycles, setup.robot.n_q, PERIOD, scenario.guard)
-    bounds = (np.array(guard.qd_bounds), np.array(guard.qdd_bounds))
-    still, force = np.zeros(setup.robot.n_q), np.zeros(6)
+    force = np.zeros(6)
     last = cycles
     for k in range(cycles):
         time = k * PERIOD
-        human = physics.human_velocity() if scenario.guard.subtract_human else None
-        out = guard.cycle(time, physics.q, physics.qd, time >= RESET_AT, human)
+        out = cell.watch(time, time >= RESET_AT)
         truth = physics.truth(setup.monitored_pairs, setup.monitored_ends) if with_truth else None
         engaged = time >= ENGAGE_AT and k < release
         if engaged:
             force = hand.force(k - begin, physics.tool_W, physics.tool_R, physics.tool_twist())
         else:
             force[:] = 0.0
-        command = still
-        if out.torque:
-            command = guide.step(physics.q, force, engaged).qd
-        else:
-            guide.halt()
-            if out.trips:
-                hand.feel_stop()
+        if out.trips and not out.torque:
+            hand.feel_stop()
         log.add(time, physics, out, force, truth, bounds)
         if recorder is not None:
             recorder.write(time, physics.q, physics.tool_W, physics.tool_R, force, out.torque)
         if out.trips and last == cycles:
             last = min(k + round(AFTER_STOP / PERIOD), cycles)
-        physics.step(command, out.torque, force)
+        cell.move(force, engaged)
         if on_progress is not None and k % 100 == 0:
             on_progress(k / cycles)
         if k >= last:
