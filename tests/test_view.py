@@ -113,6 +113,16 @@ def test_what_a_silent_sensor_saw_last_is_held_and_the_monitor_misses_it(front: 
     assert "sensor_silent" in held.found
 
 
+def test_an_arm_whose_joint_state_is_no_number_is_drawn_where_it_is(front: Scenario) -> None:
+    fault = Fault.model_validate({"kind": "joints_nan", "from": 0.05})
+    live = LiveTrial(front.model_copy(update={"faults": (fault,)}), "wb")
+    for _ in range(10):
+        live.step()
+    moment = live.moment()
+    assert np.isfinite(moment.links_W).all()
+    assert moment.mode == STOP
+
+
 def test_nothing_that_a_page_says_leads_out_of_a_stop(cell: Scenario) -> None:
     old_joints = Fault.model_validate({"kind": "joints_old", "value": 1.0, "from": 0.5, "to": 0.6})
     with started(cell.model_copy(update={"faults": (old_joints,)})) as link:

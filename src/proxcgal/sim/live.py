@@ -153,9 +153,10 @@ class LiveTrial:
         given, result = self._last
         now = (self._count - 1) * self.period
         true = self._truth.nearest(self._source.q, now).distance
+        q = given.q if np.isfinite(given.q).all() else self._source.q
         return Moment.of(
-            self.setup, given, result, self.law, now, true=true, since=self.since, off=self.off,
-            **self._hand(),
+            self.setup, given, result, self.law, now, q=q, true=true,
+            since=self.since, off=self.off, **self._hand(),
         )  # fmt: skip
 
     def _hand(self) -> dict[str, Any]:

@@ -69,6 +69,7 @@ class Moment(Posed):
         law: _core.Controller | None,
         time: float,
         *,
+        q: Array,
         true: float,
         since: float = 0.0,
         off: Collection[int] = (),
@@ -83,6 +84,7 @@ class Moment(Posed):
             result: its answer.
             law: the controller, whose clouds are copied; None: clouds are not known.
             time: the scene's, for its poses [s].
+            q: (n_q,) where the arm is, whatever the controller was told.
             true: distance from scene to robot [m].
             since: added to `time` in what is shown [s].
             off: rows of the sensors that are silent.
@@ -95,8 +97,8 @@ class Moment(Posed):
             held = np.isin(law.cloud_origins()[:, 0], list(off))
         return cls(
             elapsed=since + time,
-            q=given.q,
-            links_W=np.asarray(setup.robot.link_poses(given.q)),
+            q=q,
+            links_W=np.asarray(setup.robot.link_poses(q)),
             solids_W=np.asarray(setup.drawn.poses(time)),
             goal_W=given.goal,
             hand_W=hand_W,

@@ -127,11 +127,11 @@ def series(part: pl.DataFrame, column: str) -> Array:
 
 
 def _sigma_max(values: Array, window: tuple[float, float] | None) -> float | None:
-    """Largest standard deviation over subjects at one time; moments seen by one alone left out."""
+    """Largest standard deviation over subjects at one time that half of them, and two, have."""
     if window is not None:
         time = np.arange(values.shape[1]) * SAMPLE_S
         values = values[:, (time >= window[0]) & (time < window[1])]
-    enough = np.isfinite(values).sum(axis=0) >= 2
+    enough = np.isfinite(values).sum(axis=0) >= max(2.0, 0.5 * len(values))
     if not enough.any():
         return None
     return float(np.nanstd(values[:, enough], axis=0, ddof=1).max())

@@ -15,6 +15,7 @@ _ROWS = {
     "H2": "Assembly Operation on H2", "H3_first": "Assembly Operation on H3 (first run)",
     "H3_second": "Assembly Operation on H3 (second run)",
 }  # fmt: skip
+_FEW = 5  # subjects
 _SETTINGS = (
     ("d_min", "m"), ("buffer", "m"), ("avoid_gain", "1/s"), ("nearest", ""), ("reach_gain", "1/s"),
     ("max_linear", "m/s"), ("max_angular", "rad/s"), ("tasks", ""),
@@ -214,6 +215,10 @@ def verdicts(summary: Summary) -> list[str]:
         told.append(
             f"Trials in which the arm came within {SELF_LIMIT_M} m of itself: "
             f"{summary['self_under_limit']}; no law here avoids the own arm."
+        )
+    if summary["subjects"] < _FEW:
+        told.append(
+            f"Fewer than {_FEW} subjects: their intervals say little about others, however narrow."
         )
     redrawn = ", ".join(f"{reason} {n}" for reason, n in summary["redrawn"].items())
     told.append(

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from proxcgal.apps.view.stage import Stage
 from proxcgal.sim.moment import Moment
@@ -13,6 +14,8 @@ from proxcgal.sim.recording import Recording
 from proxcgal.sim.replay import Replay
 from proxcgal.sim.setup import Setup
 from proxcgal.sim.ticks import Tick
+
+Array = NDArray[np.float64]
 
 AHEAD = 0.5  #: [s] that a recomputed command is followed for, to be seen
 
@@ -52,17 +55,21 @@ def replayed(
     if settings.ticks != "all" and controller is None and not overrides:
         setup = Setup.of(settings.scenario)
         rows = range(len(recording.ticks))
-        moments = [_moment(setup, None, tick, tick.given.time) for tick in recording.ticks]
+        moments = [
+            _moment(setup, None, tick, q, tick.given.time)
+            for tick, q in zip(recording.ticks, recording.postures(), strict=True)
+        ]
         return Replayed(Stage.of(setup), settings.controller, tuple(moments), None, len(rows))
     again = Replay(recording, controller, overrides)
     period = again.law.config.period
     step = max(round(1.0 / (hz * period)), 1)
     last = len(recording.ticks) - 1
     moments, same = [], 0
-    for row, (then, now) in enumerate(zip(recording.ticks, again, strict=True)):
+    both = zip(recording.ticks, again, recording.postures(), strict=True)
+    for row, (then, now, q) in enumerate(both):
         same += now.result.same(then.result)
         if row % step == 0 or row == last:
-            moments.append(_moment(again.setup, again, now, row * period))
+            moments.append(_moment(again.setup, again, now, q, row * period))
     if ahead:
         moments = [_ahead(again.setup, moment) for moment in moments]
     return Replayed(
@@ -70,9 +77,9 @@ def replayed(
     )
 
 
-def _moment(setup: Setup, again: Replay | None, tick: Tick, elapsed: float) -> Moment:
+def _moment(setup: Setup, again: Replay | None, tick: Tick, q: Array, elapsed: float) -> Moment:
     law = None if again is None else again.law
-    return Moment.of(setup, tick.given, tick.result, law, elapsed, true=tick.truth.distance)
+    return Moment.of(setup, tick.given, tick.result, law, elapsed, q=q, true=tick.truth.distance)
 
 
 def _ahead(setup: Setup, moment: Moment) -> Moment:
