@@ -13,7 +13,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 
 import proxcgal as px
 from proxcgal.apps import joint_server
-from proxcgal.apps.joint_server import goal_pose, reach_of
+from proxcgal.apps.joint_goals import goal_pose, reach_of
 from proxcgal.sim.finish import Ending
 
 REACHED = (3.0, 0.291, 1.05)

@@ -83,7 +83,8 @@ from proxcgal.models import (
 )
 
 if TYPE_CHECKING:
-    from proxcgal.apps.joint_server import GoalRefusedError, JointGoal, JointRobotServer
+    from proxcgal.apps.joint_goals import GoalRefusedError, JointGoal
+    from proxcgal.apps.joint_server import JointRobotServer
 
 __version__ = _version("proxcgal")
 
@@ -162,8 +163,9 @@ __all__ = [
 
 #: Made on first use: they need the simulator, which takes longer to import than all the rest.
 _LATER = {
-    name: "proxcgal.apps.joint_server"
-    for name in ("GoalRefusedError", "JointGoal", "JointRobotServer")
+    "GoalRefusedError": "proxcgal.apps.joint_goals",
+    "JointGoal": "proxcgal.apps.joint_goals",
+    "JointRobotServer": "proxcgal.apps.joint_server",
 }
 
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Protocol
 
-from proxcgal.apps.joint_server import (
+from proxcgal.apps.joint_goals import (
     BASE,
     END_EFFECTOR,
     GoalFeedback,

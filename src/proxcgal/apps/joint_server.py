@@ -19,64 +19,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxcgal import _core
+from proxcgal.apps.joint_goals import (
+    GoalFeedback,
+    GoalRefusedError,
+    GoalResult,
+    JointGoal,
+    State,
+    goal_pose,
+    problems_of,
+    reach_of,
+    reach_problem,
+)
 from proxcgal.closing import Closing
 from proxcgal.errors import ConfigError, ProxError
 from proxcgal.models import Robot
-from proxcgal.sim import frames
 from proxcgal.sim.arms import tool_jacobian
 from proxcgal.sim.finish import Ending, GoalWatch, Outcome, pose_errors
 from proxcgal.sim.holding import concluded
 from proxcgal.sim.scenario import load_scenario
 from proxcgal.sim.scenario_joint import JointScenario
-from proxcgal.sim.setup import Setup, posture_problems
+from proxcgal.sim.setup import Setup
 from proxcgal.sim.ticks import Tick, TickInput, TickResult, TickTruth
 
 Array = NDArray[np.float64]
-State = Literal["starting", "executing", "cancelling", "succeeded", "aborted", "cancelled"]
 
-BASE, END_EFFECTOR = FRAMES = ("kuka_base", "end_effector")
 AT_REST = 1e-3  # [rad/s] of every joint
 STOPPED_AFTER = 3.0  # [s] a cancelled goal has ended, whatever avoidance still moves
 KEPT_RESULTS = 1000  # the oldest are forgotten
-
-
-class GoalRefusedError(ProxError):
-    """A goal that is not taken on, with every reason; nothing has moved."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class JointGoal:
-    """Where the tool is to go, as [JR] 3.2.1 and 4.1 have it."""
-
-    translation: Sequence[float]  # [m] (3,) r of (4.1)
-    rpy: Sequence[float] | None = None  # [rad] roll, pitch, yaw; None: orientation kept
-    frame: str = BASE  # that both are given in: kuka_base or end_effector
-    init: str = ""  # configuration to begin from; "": where the arm stands
-
-
-@dataclass(frozen=True, slots=True)
-class GoalFeedback:
-    """How a goal is doing."""
-
-    goal: int
-    state: State
-    time_s: float  # since it was taken on
-    linvel_norm: float  # [m/s] of the tool
-    angvel_norm: float  # [rad/s]
-    position_error_m: float
-    angle_error_rad: float
-
-
-@dataclass(frozen=True, slots=True)
-class GoalResult:
-    """How a goal ended."""
-
-    goal: int
-    outcome: Outcome
-    reason: str
-    time_s: float
-    position_error_m: float
-    angle_error_rad: float
+_STOP = 3  # mode
 
 
 @dataclass(slots=True)
@@ -309,25 +279,8 @@ class JointRobotServer(Closing):
 
     def _problems(self, goal: JointGoal) -> list[str]:
         """Why a goal is not taken on, a line each."""
-        problems: list[str] = []
-        for name, values in (("translation", goal.translation), ("rpy", goal.rpy)):
-            if values is None and name == "rpy":
-                continue
-            if problem := _three(name, values):
-                problems.append(problem)
-        if goal.frame not in FRAMES:
-            problems.append(f"frame = {goal.frame!r}: must be one of {', '.join(FRAMES)}")
-        scenario = self._scenario
-        q = None
-        if goal.init:
-            q = scenario.configurations.get(goal.init) if isinstance(goal.init, str) else None
-            if q is None:
-                problems.append(
-                    f"init = {goal.init!r}: there are {', '.join(scenario.configurations)}"
-                )
-            else:
-                outside = posture_problems(self.robot, q, goal.init)
-                problems += [f"init = {goal.init!r}: {line}" for line in outside]
+        configurations = self._scenario.configurations
+        problems = problems_of(goal, self.robot, configurations)
         if self._second == "refuse" and self._active is not None:
             problems.append(f"goal {self._active.number} is being executed")
         if self._failure:
@@ -336,7 +289,7 @@ class JointRobotServer(Closing):
             problems.append("the monitor has stopped the arm; only a reset where it runs helps")
         if problems:
             return problems
-        start = self._q if q is None else np.array(q)
+        start = np.array(configurations[goal.init]) if goal.init else self._q
         with np.errstate(over="ignore"):  # what overflows is out of reach
             T_WT = goal_pose(goal, np.asarray(self.robot.tool_pose(start)))
         far = reach_problem(self._reach, T_WT)
@@ -452,75 +405,3 @@ class JointRobotServer(Closing):
         T_WT = np.asarray(self.robot.tool_pose(self._q))
         goal = goal_pose(active.goal, T_WT) if active.T_WT is None else active.T_WT
         return pose_errors(T_WT, goal)
-
-
-_STOP = 3  # mode
-
-
-def goal_pose(goal: JointGoal, T_WE: Array) -> Array:
-    """(4, 4) T_WT of a goal, the tool being at T_WE; any frame but end_effector is the base.
-
-    Source: [JR] (4.2) to (4.6); (4.6) forgets to rotate, so here it is r_ee + R_ee r_goal.
-    """
-    T_WT = np.eye(4)
-    turn = None if goal.rpy is None else frames.rotation(goal.rpy)  # (4.2)
-    if goal.frame == END_EFFECTOR:
-        T_WT[:3, :3] = T_WE[:3, :3] if turn is None else T_WE[:3, :3] @ turn  # (4.4)
-        T_WT[:3, 3] = T_WE[:3, 3] + T_WE[:3, :3] @ np.asarray(goal.translation)  # (4.6), mended
-    else:
-        T_WT[:3, :3] = T_WE[:3, :3] if turn is None else turn  # (4.3)
-        T_WT[:3, 3] = goal.translation  # (4.5)
-    return T_WT
-
-
-def reach_of(robot: Robot) -> tuple[Array, float]:
-    """A point (3,) and the radius that the tool never leaves: the sum of all lengths after it."""
-    joints, frame = robot.description.joints, robot.description.tool_frame
-    length, row = float(np.linalg.norm(frame.T_JF[:3, 3])), frame.joint
-    while row >= 0 and joints[row].parent >= 0:
-        length += float(np.linalg.norm(joints[row].origin[:3, 3]))
-        if joints[row].type == "prismatic":
-            length += max(abs(joints[row].q_min), abs(joints[row].q_max))
-        row = joints[row].parent
-    return (np.zeros(3) if row < 0 else np.asarray(joints[row].origin)[:3, 3]), length
-
-
-def reach_problem(reach: tuple[Array, float], T_WT: Array) -> str | None:
-    """Why no posture brings the tool there; None where one may.
-
-    Args:
-        reach: of the robot, see `reach_of`.
-        T_WT: (4, 4) of the goal.
-    """
-    base_W, farthest = reach
-    with np.errstate(over="ignore"):
-        far = float(np.linalg.norm(T_WT[:3, 3] - base_W))
-    if far <= farthest:
-        return None
-    x, y, z = T_WT[:3, 3]
-    return (
-        f"translation: the tool would be at ({x:.6g}, {y:.6g}, {z:.6g}) m, {far:.6g} m "
-        f"from the first joint; no posture reaches beyond {farthest:.3f} m"
-    )
-
-
-def _told(values: object) -> str:
-    try:
-        return str(values)[:80]
-    except ValueError:  # Python does not write integers of so many digits
-        return "?"
-
-
-def _three(name: str, values: object) -> str | None:
-    """Why these are not three finite numbers; None where they are."""
-    try:
-        if not isinstance(values, Sequence | np.ndarray) or isinstance(values, str):
-            raise TypeError
-        if len(values) != 3:
-            raise TypeError
-        if any(isinstance(value, bool | str) for value in values):
-            raise TypeError
-        finite = all(math.isfinite(value) for value in values)
-    except (TypeError, OverflowError):
-        return f"{name} = {_told(values)}: must be three finite numbers"
-    return None if finite else f"{name} = {list(values)}: must be finite"

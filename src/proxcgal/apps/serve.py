@@ -231,7 +231,7 @@ class Front:
         return operation(client, message)
 
     def _goal(self, client: _Client, message: dict[str, Any]) -> dict[str, Any]:
-        from proxcgal.apps.joint_server import GoalRefusedError, JointGoal
+        from proxcgal.apps.joint_goals import GoalRefusedError, JointGoal
 
         known = ("init", "translation", "rpy", "frame")
         unknown = [str(key)[:40] for key in message if key not in known]
