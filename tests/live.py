@@ -38,6 +38,12 @@ class Live:
         return self.page.told.moment
 
     @property
+    def activation(self) -> tuple[Any, Any]:
+        """The curve that the page draws: times [s] and values."""
+        time, activation = self.page._controls.plots._activation.data
+        return np.asarray(time), np.asarray(activation)
+
+    @property
     def camera(self):  # type: ignore[no-untyped-def]
         return next(iter(self.server.get_clients().values())).camera
 
