@@ -5,7 +5,8 @@
 namespace proxcgal::detail {
 
 /// The nearest microsecond: durations that are whole ticks stay so, whatever rounding clocks of
-/// large numbers add, and compare with bounds in the same way.
+/// large numbers add, and compare with bounds in the same way. Of ticks that are no whole
+/// microseconds apart a jump may cost one.
 /// @param time  [s]
 inline double whole_us(double time) { return std::round(time * 1e6) / 1e6; }
 
@@ -36,7 +37,7 @@ class InternalClock {
   double caller() const { return caller_; }        ///< [s] the last that was finite
   double delay() const { return now_ - caller_; }  ///< [s] added to the caller's stamps
   /// [s] since the last tick, the nominal period at most: what has passed for the joints'
-  /// accelerations.
+  /// accelerations. By rounding at most 2.5 us more than truly has.
   double step() const { return step_; }
 
  private:

@@ -310,7 +310,7 @@ TEST(CatchUp, GivesADistanceItsRateThoughAnotherJointIsSlow) {
   EXPECT_NEAR(half[0], 0.5 * (0.1 + 0.1 / 30.0), 1e-12);
 }
 
-TEST(CatchUp, NeverLeavesTheBoxNorLowersTheFirstRow) {
+TEST(CatchUp, NeverLeavesTheBoxNorLowersARowThatIsAlone) {
   Random random(12);
   for (int trial = 0; trial < 2000; ++trial) {
     const Eigen::Index n = 7;

@@ -168,9 +168,12 @@ class RosSource:
         return self._given(now, self._q)
 
     def _may_be_early(self) -> bool:
-        """Not where joint states stay away, and not where they were late: those are counted."""
+        """Not where joint states stay away, and not where they were late: those are counted.
+
+        Nor where the last is stale by now, though its own tick was in time: the next may be due.
+        """
         now = self._clocks.now()
-        fresh = now - self._q_stamp < OVERDUE * self._period
+        fresh = now - self._q_stamp < min(OVERDUE * self._period, self._stale)
         soon = abs(self._received + self._period - now) < SOON * self._period
         return fresh and not soon and not self._late and self._early < self._most_early
 
