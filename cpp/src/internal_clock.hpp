@@ -22,7 +22,8 @@ class InternalClock {
     const double gap = caller - caller_;
     const bool good = std::isfinite(caller) && (!started_ || (gap > 0.0 && gap <= kLongestStep));
     const double before = now_;
-    if (started_) now_ = whole_us(good ? caller - offset_ : now_ + period_);
+    // Never back: through times that were no numbers it went on by itself.
+    if (started_) now_ = std::max(before, whole_us(good ? caller - offset_ : now_ + period_));
     const double step = now_ - before;
     const bool early = started_ && step < period_ - kRounding;
     step_ = early ? std::max(step, kShortest * period_) : period_;

@@ -310,7 +310,7 @@ TEST(CatchUp, GivesADistanceItsRateThoughAnotherJointIsSlow) {
   EXPECT_NEAR(half[0], 0.5 * (0.1 + 0.1 / 30.0), 1e-12);
 }
 
-TEST(CatchUp, NeverLeavesTheBoxNorLowersARowThatIsAlone) {
+TEST(CatchUp, NeverLeavesTheBoxNorLowersTheFirstRow) {
   Random random(12);
   for (int trial = 0; trial < 2000; ++trial) {
     const Eigen::Index n = 7;
@@ -326,13 +326,9 @@ TEST(CatchUp, NeverLeavesTheBoxNorLowersARowThatIsAlone) {
     task.activation = random_vector(random, 3, 0, 1);
     const JointVector before = random_vector(random, n, 0, 1).cwiseProduct(high - low) + low;
     JointVector qd = before;
-    Task first = task;
-    first.activation.tail(2).setZero();
-    JointVector alone = before;
-    catch_up(levels, first, box, alone);
-    EXPECT_GE(first.jacobian.row(0).dot(alone), first.jacobian.row(0).dot(before) - 1e-12);
     catch_up(levels, task, box, qd);
-    ASSERT_TRUE(inside(qd, box) && inside(alone, box));
+    EXPECT_GE(task.jacobian.row(0).dot(qd), task.jacobian.row(0).dot(before) - 1e-12);
+    ASSERT_TRUE(inside(qd, box));
     task.activation.setZero();
     qd = before;
     catch_up(levels, task, box, qd);

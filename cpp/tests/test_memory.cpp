@@ -202,14 +202,20 @@ std::optional<bool> seen_through(const ScanView& scan, const Vector3& point_W, d
   const double column = std::atan2(p.x(), p.z()) / pitch + 3.5;
   const double row = std::atan2(p.y(), p.z()) / pitch + 3.5;
   for (const double at : {column, row}) {
-    if (at < -close || at > 7.0 + close) return false;
+    if (at < -0.5 - close || at > 7.5 + close) return false;
     if (std::abs(at - std::round(at)) < close || std::abs(at - std::floor(at) - 0.5) < close)
       return std::nullopt;
   }
+  std::vector<int> zones;
+  if (std::min(column, row) < 0.0 || std::max(column, row) > 7.0) {
+    zones = {8 * static_cast<int>(std::round(row)) + static_cast<int>(std::round(column))};
+  } else {
+    for (const int corner : {0, 1, 8, 9})
+      zones.push_back(8 * static_cast<int>(row) + static_cast<int>(column) + corner);
+  }
   bool beyond = true;
   double nearest = kInfinity;
-  for (const int corner : {0, 1, 8, 9}) {
-    const int zone = 8 * static_cast<int>(row) + static_cast<int>(column) + corner;
+  for (const int zone : zones) {
     const double end = scan.empty_to[static_cast<std::size_t>(zone)];
     if (std::abs(end - p.z() - far) < close) return std::nullopt;
     beyond = beyond && end > p.z() + far;
@@ -483,10 +489,7 @@ TEST_F(WithMemory, AnInvalidScanLeavesTheLastCloudAndAnEmptyOneClearsIt) {
   EXPECT_GE(out.pair_origin.sensor, 0);
   EXPECT_GE(out.pair_origin.zone, 0);
   for (const double age : controller.cloud_ages(0.14)) EXPECT_NEAR(age, 0.14, 1e-12);
-  const Eigen::Index before = controller.cloud_W().rows();
   tick(0.21, 0.0, 255);
-  EXPECT_LT(controller.cloud_W().rows(), before / 3);  // what only the outermost rays pass is left
-  for (int i = 0; i < 40; ++i) tick(0.28 + 0.05 * i, 0.0, 255);
   EXPECT_EQ(controller.cloud_W().rows(), 0);
 }
 

@@ -149,11 +149,12 @@ void catch_up(std::span<const JointVector> levels, const Task& task, const Admis
               JointVector& qd) {
   if (!(task.activation.array() > 0.0).any()) return;
   const JointVector target = steady_target(levels, box).qd;
+  // What each row is to have, before one of them takes from another.
+  const RowVector now = task.jacobian * qd;
+  const RowVector least =
+      now + task.activation.cwiseProduct((task.jacobian * target - now).cwiseMax(0.0));
   for (Eigen::Index i = task.activation.size(); i-- > 0;) {
-    if (!(task.activation[i] > 0.0)) continue;
-    const JointVector row = task.jacobian.row(i).transpose();
-    const double now = row.dot(qd), behind = row.dot(target) - now;
-    if (behind > 0.0) keep_rate(row, now + task.activation[i] * behind, box, qd);
+    if (task.activation[i] > 0.0) keep_rate(task.jacobian.row(i).transpose(), least[i], box, qd);
   }
 }
 

@@ -125,6 +125,19 @@ struct Memory::Impl {
     return index.key(view.T_WS * on_ray_S) == voxel;
   }
 
+  /// Do the four rays next to a direction end beyond a depth? In the outer half of an outermost
+  /// zone there are no four: there it is that zone's own.
+  bool beyond(const ScanView& view, float tx, float ty, int zx, int zy, float depth) const {
+    const int cx = Zones::below(zones.middle, tx), cy = Zones::below(zones.middle, ty);
+    const bool outside = cx < 0 || cy < 0 || cx >= kSide - 1 || cy >= kSide - 1;
+    if (outside) return view.empty_to[static_cast<std::size_t>(kSide * zy + zx)] > depth;
+    for (const int corner : {0, 1, kSide, kSide + 1}) {
+      const float end = view.empty_to[static_cast<std::size_t>(kSide * cy + cx + corner)];
+      if (!(end > depth)) return false;
+    }
+    return true;
+  }
+
   /// @param point_S  inside the field of view
   /// @param voxel    that the point lies in
   Verdict judge(const ScanView& view, float px, float py, float pz,
@@ -135,12 +148,7 @@ struct Memory::Impl {
     const float seen = view.obstacle[static_cast<std::size_t>(kSide * zy + zx)];
     if (seen > 0.0F && std::abs(seen - pz) <= far)
       return passes(view, zx, zy, pz, voxel) ? Verdict::kThere : Verdict::kNothing;
-    const int cx = Zones::below(zones.middle, tx), cy = Zones::below(zones.middle, ty);
-    if (cx < 0 || cy < 0 || cx >= kSide - 1 || cy >= kSide - 1) return Verdict::kNothing;
-    for (const int corner : {0, 1, kSide, kSide + 1}) {
-      const float end = view.empty_to[static_cast<std::size_t>(kSide * cy + cx + corner)];
-      if (!(end > pz + far)) return Verdict::kNothing;
-    }
+    if (!beyond(view, tx, ty, zx, zy, pz + far)) return Verdict::kNothing;
     const float dx = (tx - zones.middle[static_cast<std::size_t>(zx)]) * pz;
     const float dy = (ty - zones.middle[static_cast<std::size_t>(zy)]) * pz;
     const auto round_voxel = static_cast<float>(0.5 * std::numbers::sqrt3 * config.voxel);

@@ -61,9 +61,9 @@ double keep_rate(const JointVector& row, double least, const Admissible& box, Jo
 /// `command` goes straight towards its target, as far as the slowest joint's acceleration limit
 /// allows: where a lower level wants fast joints, a distance row gets the same small share of its
 /// change as they, and stays behind although there is room for all of it. Each row makes up the
-/// share a of that, its activation, changing `qd` as little as possible; the first row comes last,
-/// so that it has the last word: with a = 1 it gets all that the target does for it, as far as the
-/// box allows. What another row took from one with a < 1 it regains by that share only.
+/// share a of that, its activation, changing `qd` as little as possible; what each is to have is
+/// settled before one takes from another, and the first row comes last, so that it has the last
+/// word: as far as the box allows it gets its share, and never loses.
 /// @param task  rows whose rate is better the higher it is: distances
 /// @param box   `low` = `high` = `qd` holds a joint, for a more important task; the target does not
 ///              depend on it
