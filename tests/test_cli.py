@@ -73,6 +73,14 @@ def test_no_command_is_bad_input_and_shows_the_help(call: Call) -> None:
     assert "usage: proxcgal" in answer.err
 
 
+def test_coverage_of_an_arm_without_sensors_is_refused(call: Call, tmp_path: Path) -> None:
+    answer = call("coverage", "walkthrough_teach", "--out", str(tmp_path / "out"))
+    assert answer.code == 2
+    assert answer.err.count("\n") == 1
+    assert "no sensors" in answer.err
+    assert not (tmp_path / "out").exists()
+
+
 def test_an_unknown_command_is_told_with_the_nearest_one(call: Call) -> None:
     answer = call("reply")
     assert answer.code == 2

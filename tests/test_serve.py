@@ -187,6 +187,15 @@ def test_nonsense_is_answered_and_moves_nothing(served: Served, line: bytes) -> 
     client.close()
 
 
+def test_what_a_goal_lacks_is_named(served: Served) -> None:
+    client = served.client()
+    client.send({"op": "goal", "frame": "kuka_base"})
+    answer = client.read()
+    assert answer["type"] == "refused"
+    assert "translation is missing" in str(answer["reason"])
+    client.close()
+
+
 def test_a_message_without_end_is_cut_off(served: Served) -> None:
     client = served.client()
     client.send(b"x" * (serve.LINE_BYTES + 2000))

@@ -99,4 +99,36 @@ inline Points cloud(Random& random, int n, double half) {
   return points;
 }
 
+/// Where its tool would be 0.2 m farther on.
+inline Pose goal_near(const Robot& robot, const JointVector& q) {
+  Pose goal = tool_at(robot, q);
+  goal.translation().x() += 0.2;
+  return goal;
+}
+
+/// Scans of a room of changing depth; the noise makes the closest pair jump.
+inline std::vector<Scan> scans(Random& random, int sensors, std::uint32_t counter, double stamp,
+                               double nearest = 0.15) {
+  std::vector<Scan> out;
+  for (int s = 0; s < sensors; ++s) {
+    Scan scan;
+    scan.sensor = s;
+    scan.counter = counter;
+    scan.stamp = stamp;
+    scan.status.fill(5);
+    for (double& range : scan.ranges) range = random.uniform(nearest, 1.2);
+    out.push_back(scan);
+  }
+  return out;
+}
+
+/// Every kind of task, and confirmation.
+inline ControllerConfig five_tasks() {
+  ControllerConfig config;
+  config.tasks = {JointLimits{}, Avoidance{.nearest = 3}, MinimumAltitude{}, Manipulability{},
+                  Reach{}};
+  config.filter.confirmation = Confirmation::kScans;
+  return config;
+}
+
 }  // namespace proxcgal::test

@@ -62,6 +62,11 @@ def coverage_command(options: CoverageOptions, command: str) -> int:
 
     changes = [] if options.seed is None else [f"seed={options.seed}"]
     scenario = load_scenario(options.scenario, changes + flat(options.set))
+    if scenario.kind == "walkthrough":
+        raise ConfigError(
+            f'{options.scenario} has kind = "walkthrough", whose arm carries no sensors: '
+            "there is nothing to cover"
+        )
     if options.at is not None and not 0.0 <= options.at <= scenario.duration:
         raise ConfigError(
             f"--at {options.at:g}: must be between 0 and the scenario's {scenario.duration:g} s"

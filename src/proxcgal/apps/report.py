@@ -19,10 +19,12 @@ class ReportOptions:
       proxcgal report out/demo
       proxcgal report out/front_plane
       proxcgal report out/sweep
+      proxcgal report out/campaign-static
     """
 
     dir: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR")]
-    """A folder that `proxcgal run`, `proxcgal demo` or `proxcgal sweep` wrote."""
+    """A folder that `proxcgal run`, `proxcgal demo` or `proxcgal sweep` wrote, or a
+    finished `proxcgal campaign`."""
 
 
 def report_command(options: ReportOptions, command: str) -> int:

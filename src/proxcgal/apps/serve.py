@@ -32,10 +32,14 @@ CLOSE_S = 1.0  # [s] that a client has to read its last message
 class ServeOptions:
     """Take goals for the 12-joint robot: one JSON object a line, over TCP, on loopback.
 
-    Goal:   {"op": "goal", "init": "free", "translation": [3.0, 0.3, 1.05], "rpy": [0, 1.57, 0],
-             "frame": "kuka_base"}   (init and rpy may be left out; or frame "end_effector")
-    Cancel: {"op": "cancel", "goal": 1}
-    State:  {"op": "state"}
+    A goal ([m], [rad]; init, rpy and frame may be left out; frame may be "end_effector"):
+
+      {"op": "goal", "init": "free", "translation": [3.0, 0.3, 1.05], "rpy": [0, 1.57, 0]}
+
+    Its end, which any client may ask for, and where the arm stands:
+
+      {"op": "cancel", "goal": 1}
+      {"op": "state"}
 
     Answers: accepted, refused (with the reason), cancelling, state; then feedback ten times a
     second, and one result for each goal: succeeded, aborted or cancelled, with the reason.
@@ -233,13 +237,15 @@ class Front:
     def _goal(self, client: _Client, message: dict[str, Any]) -> dict[str, Any]:
         from proxcgal.apps.joint_goals import GoalRefusedError, JointGoal
 
-        known = ("init", "translation", "rpy", "frame")
-        unknown = [str(key)[:40] for key in message if key not in known]
+        optional = ("rpy", "frame", "init")
+        unknown = [str(key)[:40] for key in message if key not in ("translation", *optional)]
+        missing = ["translation"] if "translation" not in message else []
         texts = [key for key in ("init", "frame") if not isinstance(message.get(key, ""), str)]
-        if unknown or texts or "translation" not in message:
+        if unknown or texts or missing:
             return {
                 "type": "refused",
-                "reason": f"a goal has translation, and may have {', '.join(known)}"
+                "reason": f"a goal has translation, and may have {', '.join(optional)}"
+                + "".join(f"; {key} is missing" for key in missing)
                 + "".join(f"; {key} is unknown" for key in unknown[:4])
                 + "".join(f"; {key} must be a string" for key in texts),
             }

@@ -124,7 +124,8 @@ def coverage_lines(scene: str, controllers: Mapping[str, Mapping[str, float | No
         if len(told) == len(shares):
             lines.append(
                 f"{scene}, {name}: of the truly closest points {told[0]:.0f} % were in view, "
-                f"{told[1]:.0f} % remembered, {told[2]:.0f} % forgotten, {told[3]:.0f} % never seen"
+                f"{told[1]:.0f} % within the memory's time before, {told[2]:.0f} % earlier, "
+                f"{told[3]:.0f} % never"
             )
     return lines
 

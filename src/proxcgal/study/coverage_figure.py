@@ -86,6 +86,8 @@ def coverage_figure(
     for ax in axes:
         ax.tick_params(labelsize=9)
         ax.spines[["top", "right"]].set_visible(False)
+    for ax in axes[:2]:
+        ax.locator_params(axis="x", nbins=6)
     return figure
 
 

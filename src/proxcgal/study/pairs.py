@@ -59,7 +59,7 @@ def pair_figure(
     FigureCanvasAgg(figure)
     figure.suptitle(title, fontsize=12, fontweight="bold", y=1.0 - 0.1 / height)
     figure.subplots_adjust(
-        left=0.0, right=0.96, bottom=0.02, top=1.0 - 0.8 / height, wspace=0.04, hspace=0.16
+        left=0.0, right=0.96, bottom=0.25 / height, top=1.0 - 0.8 / height, wspace=0.04, hspace=0.16
     )
     for i, row in enumerate(rows):
         everything = np.vstack([np.vstack((v.robot_W, v.context_W, v.obstacle_W)) for v in row])

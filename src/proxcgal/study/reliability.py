@@ -8,9 +8,12 @@ from typing import Any
 from proxcgal.study.fault_rows import RUN, Row
 
 _CONTROLLER = "cpp/tests/test_controller.cpp"
+_STALENESS = "cpp/tests/test_staleness.cpp"
+_CONTACT = "cpp/tests/test_contact.cpp"
+_CLOCK = "cpp/tests/test_clock.cpp"
+_REMEMBERING = "cpp/tests/test_remembering.cpp"
 _MISBEHAVIOUR = "cpp/tests/test_misbehaviour.cpp"
 _COMMAND = "cpp/tests/test_command.cpp"
-_MEMORY = "cpp/tests/test_memory.cpp"
 _MESH = "cpp/tests/test_mesh_tree.cpp"
 _PIPELINE = "cpp/tests/test_pipeline.cpp"
 _FUZZ = "cpp/tests/test_fuzz.cpp"
@@ -39,16 +42,16 @@ class Goal:
 
 SHOWN: tuple[Shown, ...] = (
     Shown("a silent sensor's sector", "at most 0.25 m/s into it, none from 0.19 s on, then HOLD",
-          ((_CONTROLLER, "MotionIntoWhatASilentSensorSawIsHeld"),)),
+          ((_STALENESS, "MotionIntoWhatASilentSensorSawIsHeld"),)),
     Shown("every status code and range that is none", "invalid, counted; neither contact nor free",
           ((_PIPELINE, "OnlyTrustedZonesInRangeBecomePoints"),
            ("tests/test_faults.py", "test_every_status_code_is_judged_as_the_table_has_it"),
            (_CONTROLLER, "WhatNoZoneTellsIsUnknownNotFree"))),
     Shown("duplicate, older, future and very old scans", "refused and told",
-          ((_CONTROLLER, "ARepeatedOrOlderScanIsRefused"),
-           (_CONTROLLER, "AScanOfLongAgoIsRefused"))),
+          ((_STALENESS, "ARepeatedOrOlderScanIsRefused"),
+           (_STALENESS, "AScanOfLongAgoIsRefused"))),
     Shown("clock jump of an hour either way", "the same commands",
-          ((_CONTROLLER, "AClockThatJumpsAnHourChangesNoCommand"),)),
+          ((_CLOCK, "AClockThatJumpsAnHourChangesNoCommand"),)),
     Shown("mount 5 mm or 2 degrees wrong", "found where enough of the body is in view, in those "
           "directions that show; the run is refused",
           (("tests/test_mounts.py",
@@ -74,9 +77,9 @@ SHOWN: tuple[Shown, ...] = (
            ("tests/test_models_urdf.py",
             "test_hostile_depth_and_size_are_refused_at_little_cost"))),
     Shown("joint state not a number", "STOP within the tick, latched",
-          ((_CONTROLLER, "ANanJointStateStopsWithinOneCycleAndStaysStopped"),)),
+          ((_STALENESS, "ANanJointStateStopsWithinOneCycleAndStaysStopped"),)),
     Shown("joint state old", "HOLD after 20 ms, STOP after 100 ms",
-          ((_CONTROLLER, "AnOldJointStateHoldsAndAtLastStops"),)),
+          ((_STALENESS, "AnOldJointStateHoldsAndAtLastStops"),)),
     Shown("avoidance not executed inside d_min", "told; HOLD after 0.1 s",
           ((_MISBEHAVIOUR, "AvoidanceThatIsNotExecutedInsideTheLeastDistanceHolds"),)),
     Shown("start outside joint limits", "only inward",
@@ -90,15 +93,15 @@ SHOWN: tuple[Shown, ...] = (
            ("cpp/tests/test_solve.cpp", "TheFirstLevelKeepsItsOptimumAboveAnyOther"))),
     Shown("obstacle at the surface, inside it, or taken for body", "kept until seen outside; every "
           "command leads out",
-          ((_CONTROLLER, "AnObstacleThatTouchesIsNotTakenForBody"),
-           (_CONTROLLER, "FromContactAndFromInsideEveryCommandLeadsOut"),
-           (_CONTROLLER, "InsideTheLeastDistanceNothingComesNearer"))),
+          ((_CONTACT, "AnObstacleThatTouchesIsNotTakenForBody"),
+           (_CONTACT, "FromContactAndFromInsideEveryCommandLeadsOut"),
+           (_CONTACT, "InsideTheLeastDistanceNothingComesNearer"))),
     Shown("a stuck payload", "suspect however far it sees; what it shows inside d_min ends with "
           "its fault, what is remembered from before stays, and it clears nothing",
-          ((_CONTROLLER, "TheSamePayloadAgainAndAgainIsSuspect"),
+          ((_STALENESS, "TheSamePayloadAgainAndAgainIsSuspect"),
            (_MISBEHAVIOUR, "AStuckPayloadDoesNotOutliveItsFaultAsAContact"),
-           (_MEMORY, "AStuckPayloadClearsNothingAndIsNotRememberedOnceItEnds"),
-           (_MEMORY,
+           (_REMEMBERING, "AStuckPayloadClearsNothingAndIsNotRememberedOnceItEnds"),
+           (_REMEMBERING,
             "WhatIsRememberedInsideTheLeastDistanceStaysThoughItsSensorIsStuckSince"))),
     Shown("closest point jumps between links", "acceleration limits hold; a switch at once only by "
           "10 mm or inside d_min, else one per 100 ms",
@@ -173,7 +176,7 @@ GOALS: tuple[Goal, ...] = (
     Goal("8. ASan, UBSan, TSan clean, with and without NDEBUG",
          ((_FUZZ, "TwentyThousandRandomTicksKeepEveryPromise"),),
          "`./run check --asan`, `--ubsan`, `--tsan`; CI: `./run check --asan-ubsan --short`"),
-    Goal("9. outward recovery", ((_CONTROLLER, "FromContactAndFromInsideEveryCommandLeadsOut"),),
+    Goal("9. outward recovery", ((_CONTACT, "FromContactAndFromInsideEveryCommandLeadsOut"),),
          _LONG_CPP),
 )  # fmt: skip
 

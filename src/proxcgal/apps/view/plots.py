@@ -101,7 +101,7 @@ def plot(gui: viser.GuiApi, title: str, highest: float, height: int, *curves: Cu
             "x": viser.uplot.Scale(time=False, auto=True),
             "y": viser.uplot.Scale(auto=False, range=(0.0, 1.04 * highest)),
         },
-        axes=(viser.uplot.Axis(size=28), viser.uplot.Axis(size=46)),
+        axes=(viser.uplot.Axis(size=34), viser.uplot.Axis(size=46)),
         legend={"show": len(curves) > 1, "live": False},
     )
 
