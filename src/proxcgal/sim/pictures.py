@@ -118,7 +118,7 @@ def animate(
     times = np.arange(0.0, min(end, seconds or end) + 1e-9, 1.0 / fps)
     replay = Replay(recording)
     scenario = replay.setup.scenario
-    world = World(replay.setup.robot, scenario.drawn(), scenario.floor)
+    world = World(replay.setup.robot, scenario.drawn(), scenario.floor, replay.setup.scene.names)
     try:
         frames = [
             Image.fromarray(draw(world, snapshot, size, camera or viewpoint(replay.setup)))

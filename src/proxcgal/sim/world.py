@@ -13,7 +13,7 @@ import copy
 import ctypes
 import os
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
@@ -62,6 +62,7 @@ _GEOMS: dict[type[Solid], Any] = {
 }
 _LINK_COLORS = ((0.83, 0.84, 0.86, 1.0), (0.45, 0.62, 0.76, 1.0))
 _OBSTACLE_COLOR = (0.98, 0.72, 0.35, 0.4)
+_UNSENSED_COLOR = (0.62, 0.64, 0.67, 0.35)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,13 +105,20 @@ class Hits:
 class World:
     """A robot's full-resolution links and a scene's solids, at one moment at a time."""
 
-    def __init__(self, robot: Robot, scene: Scene | None = None, floor: float = 0.0) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        scene: Scene | None = None,
+        floor: float = 0.0,
+        sensed: Collection[str] | None = None,
+    ) -> None:
         """Builds both.
 
         Args:
             robot: its `full_mesh` gives what rays meet, its `link_poses` where.
             scene: solids in the base frame; left out: none.
             floor: its height in pictures [m].
+            sensed: solids that sensors see, by name; others are grey in pictures. Left out: all.
 
         Raises:
             SimulationError: MuJoCo refuses a mesh, with the link's name.
@@ -126,6 +134,10 @@ class World:
         self._data = mujoco.MjData(self._model)
         self._model.geom_pos[self._model.geom("floor").id, 2] = floor
         self._shape(solids)
+        for row, name in enumerate(() if scene is None else scene.names):
+            if sensed is not None and name not in sensed:
+                geom = int(self._model.body_geomadr[1 + self._links + row])
+                self._model.geom_rgba[geom] = _UNSENSED_COLOR
         self._renderers: dict[tuple[int, int], Any] = {}
         self._place_scene(0.0)
         self.place(np.zeros(robot.n_q))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
@@ -50,7 +51,7 @@ def time_figure(
         buffer: Delta, over which its activation rises [m].
         signals: vertical lines through all of it.
     """
-    figure = Figure(figsize=(7.2, 5.8), dpi=DPI, layout="constrained")
+    figure = Figure(figsize=(7.2, 6.0), dpi=DPI, layout=ConstrainedLayoutEngine(h_pad=0.1))
     FigureCanvasAgg(figure)
     figure.suptitle(title, fontsize=12, fontweight="bold")
     axes = figure.subplots(3, 1, sharex=True, height_ratios=(3.4, 1.5, 0.32 * len(logs) + 0.1))
@@ -115,7 +116,7 @@ def mark_signals(axes: Iterable[Axes], signals: Signals) -> None:
                 ax.annotate(
                     note, (at, 1.0), xycoords=("data", "axes fraction"), xytext=(2, -3),
                     textcoords="offset points", fontsize=7, color=GREY, rotation=90, ha="left",
-                    va="top",
+                    va="top", bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5},
                 )  # fmt: skip
 
 
@@ -151,11 +152,9 @@ def _links(ax: Axes, logs: Sequence[TrialLog]) -> None:
             if end - start > 0.0115 * duration * len(link):  # else the text would not fit
                 ax.text((start + end) / 2, row, link, ha="center", va="center", fontsize=7.5)
                 told.add(link)
-    rest = [link for link in order if link not in told]
-    if rest and isinstance(ax.figure, Figure):
-        colours = [BANDS[order.index(link) % len(BANDS)] for link in rest]
-        patches = [Patch(color=colour) for colour in colours]
-        ax.figure.legend(patches, rest, loc="outside lower right", ncols=4, **LEGEND)
+    if any(link not in told for link in order) and isinstance(ax.figure, Figure):
+        patches = [Patch(color=BANDS[row % len(BANDS)]) for row in range(len(order))]
+        ax.figure.legend(patches, order, loc="outside lower center", ncols=4, **LEGEND)
     ax.set_yticks(range(len(logs)), [log.controller for log in reversed(logs)])
     ax.set_ylim(-0.6, len(logs) - 0.4)
     ax.set_ylabel("control\npoint on", fontsize=10)

@@ -46,7 +46,7 @@ def motion_picture(
     times = np.linspace(0.0, max(r.ticks[-1].given.time for r in recordings), FRAMES)
     seen = [snapshots(recording, times.tolist()) for recording in recordings]
     camera = camera_for(setup)
-    world = World(setup.robot, setup.scenario.drawn(), setup.scenario.floor)
+    world = World(setup.robot, setup.scenario.drawn(), setup.scenario.floor, setup.scene.names)
     frames = []
     try:
         for row, moment in enumerate(zip(*seen, strict=True)):
