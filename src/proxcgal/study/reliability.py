@@ -154,17 +154,19 @@ SHOWN: tuple[Shown, ...] = (
 _LONG_CPP = "`./run test --long`"
 GOALS: tuple[Goal, ...] = (
     Goal("1. 10^6 fuzzed frames", ((_FUZZ, "TwentyThousandRandomTicksKeepEveryPromise"),),
-         f"{_LONG_CPP}; `./run fuzz MINUTES tick`"),
+         f"{_LONG_CPP}; `./run fuzz MINUTES tick`", "no promise broken"),
     Goal("2. every row, 200 seeds, two robots",
          (("tests/test_faults.py", "test_the_mode_is_right_in_time_and_the_arm_recovers"),),
          "`proxcgal campaign faults --runs 200`",
          "as many seeds as the table above has"),
     Goal("3. no allocation in 10^6 ticks; p99.9; adversarial clouds",
-         ((_CONTROLLER, "TickAllocatesNothing"),), f"{_LONG_CPP}; `./run bench`"),
+         ((_CONTROLLER, "TickAllocatesNothing"),), f"{_LONG_CPP}; `./run bench`",
+         "no allocation; times: benchmarks.md"),
     Goal("4. solver against an independent one, 10^5 stacks",
          (("tests/test_solve.py", "test_agrees_with_the_formulas_on_random_stacks"),), _LONG_CPP),
     Goal("5. 10^6 point and ray queries", ((_MESH, "NearestAgreesWithCgal"),
-                                           (_MESH, "FirstHitAgreesWithCgal")), _LONG_CPP),
+                                           (_MESH, "FirstHitAgreesWithCgal")), _LONG_CPP,
+         "within 1e-9 m"),
     Goal("6. 1000 kills; a log cut at every byte",
          (("tests/test_recording.py", "test_20_killed_writers_lose_no_acknowledged_tick"),
           ("tests/test_recording.py", "test_a_file_cut_anywhere_gives_all_ticks_before_the_cut")),
@@ -177,7 +179,9 @@ GOALS: tuple[Goal, ...] = (
          ((_FUZZ, "TwentyThousandRandomTicksKeepEveryPromise"),),
          "`./run check --asan`, `--ubsan`, `--tsan`; CI: `./run check --asan-ubsan --short`"),
     Goal("9. outward recovery", ((_CONTACT, "FromContactAndFromInsideEveryCommandLeadsOut"),),
-         _LONG_CPP),
+         _LONG_CPP,
+         "each of 16118 commands leads out; after 1 ms 16 were nearer, by up to 0.1 mm, to another "
+         "face of the mesh"),
 )  # fmt: skip
 
 _HEAD = """\
