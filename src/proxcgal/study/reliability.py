@@ -163,7 +163,8 @@ GOALS: tuple[Goal, ...] = (
          ((_CONTROLLER, "TickAllocatesNothing"),), f"{_LONG_CPP}; `./run bench`",
          "no allocation; times: benchmarks.md"),
     Goal("4. solver against an independent one, 10^5 stacks",
-         (("tests/test_solve.py", "test_agrees_with_the_formulas_on_random_stacks"),), _LONG_CPP),
+         (("tests/test_solve.py", "test_agrees_with_the_formulas_on_random_stacks"),), _LONG_CPP,
+         "as the formulas, within rounding; the first level at its optimum"),
     Goal("5. 10^6 point and ray queries", ((_MESH, "NearestAgreesWithCgal"),
                                            (_MESH, "FirstHitAgreesWithCgal")), _LONG_CPP,
          "within 1e-9 m"),
@@ -171,10 +172,11 @@ GOALS: tuple[Goal, ...] = (
          (("tests/test_recording.py", "test_20_killed_writers_lose_no_acknowledged_tick"),
           ("tests/test_recording.py", "test_a_file_cut_anywhere_gives_all_ticks_before_the_cut")),
          _LONG_CPP,
-         "1000 kills: no acknowledged tick lost"),
+         "1000 kills: no acknowledged tick lost; cut at every byte: all ticks before it read"),
     Goal("7. replays bit-identical",
          (("tests/test_trial.py",
-           "test_a_replay_gives_every_recorded_answer_again_bit_for_bit"),), _LONG_CPP),
+           "test_a_replay_gives_every_recorded_answer_again_bit_for_bit"),), _LONG_CPP,
+         "every answer, to the bit"),
     Goal("8. ASan, UBSan, TSan clean, with and without NDEBUG",
          ((_FUZZ, "TwentyThousandRandomTicksKeepEveryPromise"),),
          "`./run check --asan`, `--ubsan`, `--tsan`; CI: `./run check --asan-ubsan --short`"),
@@ -260,8 +262,8 @@ that is 4 or 5 of 30 sensors. An offset of a sensor's ranges counts as a shift a
 what is held within 60 mm before the body may be taken for a wrong mount.
 
 Where stamps are off, a run is wrong too if a point of the arm itself leaks while avoidance acts. A
-noisy self-hit beyond 4 sigma does so in one of some hundred runs, fault or none: drop `fault=` from the
-command that the campaign prints to see it. `filter.confirmation` ends it, for a scan of delay.
+noisy self-hit beyond 4 sigma does so in one of some hundred runs, fault or none: the command that the
+campaign prints shows it without `fault=` too. `filter.confirmation` ends it, for a scan of delay.
 """
 _END = """
 Where a goal's last column is empty, its long form did not run to its end on this state of the
