@@ -262,8 +262,8 @@ that is 4 or 5 of 30 sensors. An offset of a sensor's ranges counts as a shift a
 what is held within 60 mm before the body may be taken for a wrong mount.
 
 Where stamps are off, a run is wrong too if a point of the arm itself leaks while avoidance acts. A
-noisy self-hit beyond 4 sigma does so in one of some hundred runs, fault or none: the command that the
-campaign prints shows it without `fault=` too. `filter.confirmation` ends it, for a scan of delay.
+noisy self-hit beyond 4 sigma does so in one of some hundred runs, fault or none: drop `fault=` from
+the printed command to see it. `filter.confirmation` ends it, for a scan of delay.
 """
 _END = """
 Where a goal's last column is empty, its long form did not run to its end on this state of the
