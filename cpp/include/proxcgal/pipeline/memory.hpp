@@ -51,10 +51,10 @@ struct RememberedPoint {
 ///   - when it is `memory_s` old;
 ///   - when there are too many, and it is one of those farthest from the arm; never the nearest.
 /// A zone is a cone of 5.6 deg of which only the middle ray is proved empty: a point is seen
-/// through where all four rays next to it end beyond it, and the nearest passes its voxel; outside the
-/// middle rays of the outermost zones, where there are no four, where its zone's own does. What lies
-/// farther than half a voxel's diagonal from all rays of a sensor that stands still stays until it
-/// is old: of voxels of 0.05 m that begins at 0.57 m, at the corners of zones.
+/// through where all four rays next to it end beyond it, and the nearest passes its voxel; outside
+/// the middle rays of the outermost zones, where there are no four, where its zone's own does. What
+/// lies farther than half a voxel's diagonal from all rays of a sensor that stands still stays
+/// until it is old: of voxels of 0.05 m that begins at 0.57 m, at the corners of zones.
 ///
 /// Looking through the points is bounded in each tick, by 8192 pairs of point and scan: within six
 /// ticks (the time from scan to scan at 15 Hz) some 45 sensors look at 1024 points. More sensors or
