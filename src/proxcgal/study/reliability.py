@@ -179,7 +179,8 @@ GOALS: tuple[Goal, ...] = (
          "every answer, to the bit"),
     Goal("8. ASan, UBSan, TSan clean, with and without NDEBUG",
          ((_FUZZ, "TwentyThousandRandomTicksKeepEveryPromise"),),
-         "`./run check --asan`, `--ubsan`, `--tsan`; CI: `./run check --asan-ubsan --short`"),
+         "`./run check --asan-ubsan`, `--tsan`; CI: `./run check --asan-ubsan --short`",
+         "clean, with and without assertions"),
     Goal("9. outward recovery", ((_CONTACT, "FromContactAndFromInsideEveryCommandLeadsOut"),),
          _LONG_CPP,
          "each of 16118 commands leads out; after 1 ms 16 were nearer, by up to 0.1 mm, to another "
