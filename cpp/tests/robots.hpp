@@ -106,18 +106,23 @@ inline Pose goal_near(const Robot& robot, const JointVector& q) {
   return goal;
 }
 
+/// A scan whose zones all see something, at no range yet.
+inline Scan scan_of(int sensor, std::uint32_t counter, double stamp) {
+  Scan scan;
+  scan.sensor = sensor;
+  scan.counter = counter;
+  scan.stamp = stamp;
+  scan.status.fill(5);
+  return scan;
+}
+
 /// Scans of a room of changing depth; the noise makes the closest pair jump.
 inline std::vector<Scan> scans(Random& random, int sensors, std::uint32_t counter, double stamp,
                                double nearest = 0.15) {
   std::vector<Scan> out;
   for (int s = 0; s < sensors; ++s) {
-    Scan scan;
-    scan.sensor = s;
-    scan.counter = counter;
-    scan.stamp = stamp;
-    scan.status.fill(5);
-    for (double& range : scan.ranges) range = random.uniform(nearest, 1.2);
-    out.push_back(scan);
+    out.push_back(scan_of(s, counter, stamp));
+    for (double& range : out.back().ranges) range = random.uniform(nearest, 1.2);
   }
   return out;
 }

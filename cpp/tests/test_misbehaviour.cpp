@@ -18,14 +18,9 @@ using test::tool_at;
 std::vector<Scan> wall(int sensors, std::uint32_t counter, double stamp, double range) {
   std::vector<Scan> out;
   for (int s = 0; s < sensors; ++s) {
-    Scan scan;
-    scan.sensor = s;
-    scan.counter = counter;
-    scan.stamp = stamp;
-    scan.status.fill(5);
+    out.push_back(test::scan_of(s, counter, stamp));
     for (int zone = 0; zone < kZones; ++zone)
-      scan.ranges[static_cast<std::size_t>(zone)] = range + 1e-3 * ((zone + counter) % 7);
-    out.push_back(scan);
+      out.back().ranges[static_cast<std::size_t>(zone)] = range + 1e-3 * ((zone + counter) % 7);
   }
   return out;
 }

@@ -7,8 +7,11 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from proxcgal.apps.joint_goals import (
+    AT_REST,
     BASE,
     END_EFFECTOR,
+    KEPT_RESULTS,
+    STOPPED_AFTER,
     GoalFeedback,
     GoalRefusedError,
     GoalResult,
@@ -21,8 +24,11 @@ from proxcgal.apps.joint_goals import (
 from proxcgal.sim.finish import Outcome, pose_errors
 
 __all__ = [
+    "AT_REST",
     "BASE",
     "END_EFFECTOR",
+    "KEPT_RESULTS",
+    "STOPPED_AFTER",
     "GoalFeedback",
     "GoalRefusedError",
     "GoalResult",

@@ -13,7 +13,10 @@ from proxcgal import _core
 from proxcgal.models import Robot
 from proxcgal.sim.ticks import TickInput, TickResult
 from proxcgal_ros.goals import (
+    AT_REST,
     BASE,
+    KEPT_RESULTS,
+    STOPPED_AFTER,
     GoalFeedback,
     GoalRefusedError,
     GoalResult,
@@ -29,10 +32,7 @@ from proxcgal_ros.goals import (
 
 Array = NDArray[np.float64]
 
-AT_REST = 1e-3  # [rad/s] of every joint
-STOPPED_AFTER = 3.0  # [s] a cancelled goal has ended, whatever avoidance still moves
 HELD_OFF = 0.5  # activation of avoidance at which an obstacle is why a goal was not reached
-KEPT_RESULTS = 1000  # the oldest are forgotten
 _STOP = int(_core.Mode.STOP.value)
 
 

@@ -23,6 +23,9 @@ Array = NDArray[np.float64]
 State = Literal["starting", "executing", "cancelling", "succeeded", "aborted", "cancelled"]
 
 BASE, END_EFFECTOR = FRAMES = ("kuka_base", "end_effector")
+AT_REST = 1e-3  # [rad/s] of every joint
+STOPPED_AFTER = 3.0  # [s] a cancelled goal has ended, whatever avoidance still moves
+KEPT_RESULTS = 1000  # the oldest are forgotten
 
 
 class GoalRefusedError(ProxError):

@@ -20,6 +20,9 @@ from numpy.typing import NDArray
 
 from proxcgal import _core
 from proxcgal.apps.joint_goals import (
+    AT_REST,
+    KEPT_RESULTS,
+    STOPPED_AFTER,
     GoalFeedback,
     GoalRefusedError,
     GoalResult,
@@ -43,9 +46,6 @@ from proxcgal.sim.ticks import Tick, TickInput, TickResult, TickTruth
 
 Array = NDArray[np.float64]
 
-AT_REST = 1e-3  # [rad/s] of every joint
-STOPPED_AFTER = 3.0  # [s] a cancelled goal has ended, whatever avoidance still moves
-KEPT_RESULTS = 1000  # the oldest are forgotten
 _STOP = 3  # mode
 
 

@@ -103,8 +103,7 @@ async def _serve(robot: JointRobotServer, options: ServeOptions) -> None:
     stop = asyncio.current_task()
     assert stop is not None
     # Ctrl-C cancels this task already; a service manager's wish to end does the same.
-    with contextlib.suppress(NotImplementedError):
-        asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, stop.cancel)
+    asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, stop.cancel)
     async with server:
         try:
             await front.run()

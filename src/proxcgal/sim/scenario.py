@@ -194,10 +194,11 @@ def load_scenario(name_or_path: str | Path, overrides: Sequence[str] = ()) -> Sc
             f"scenario {str(name_or_path)!r}: {reason}; a path to a TOML file or one of: "
             f"{', '.join(sorted(built_in))}"
         ) from None
-    table = toml.parse(text, str(path))
+    origin = path.name if str(name_or_path) in built_in else str(path)
+    table = toml.parse(text, origin)
     table.setdefault("name", path.stem)
     _anchor(table, path.parent)
-    return _checked(table, str(path), overrides)
+    return _checked(table, origin, overrides)
 
 
 def parse_scenario(text: str, origin: str, overrides: Sequence[str] = ()) -> Scenario:
