@@ -27,7 +27,9 @@ PAPER = {
 #: Where the paper's difference is clear: wb must not be behind sm there.
 CLEAR = ("task2", "H3_first", "H3_second")
 BEHIND_MM = -5.0  # [mm] the paired interval's lower end must be above it there
-COMPARISONS = (("wb", "sm"), ("wb_memory", "sm"), ("wb_memory", "wb"), ("wb_known", "wb"))
+COMPARISONS = (
+    ("wb", "sm"), ("wb_memory", "sm"), ("wb_known", "sm"), ("wb_memory", "wb"), ("wb_known", "wb")
+)  # fmt: skip
 SAMPLE_S = 1.0 / SAMPLES_HZ
 
 
