@@ -431,3 +431,12 @@ def test_two_processes_do_not_work_in_one_folder(call: Call, whole: Path) -> Non
         answer = call(*SMALL, "--quiet", "--out", whole)
     assert answer.code == 2
     assert "another process is at work on this campaign" in answer.err
+
+
+def test_a_store_that_is_closed_twice_closes_nothing_else(tmp_path: Path) -> None:
+    store = Store(tmp_path / "one", {})
+    store.close()
+    with Store(tmp_path / "other", {}):  # has the handle of the first
+        store.close()
+        with pytest.raises(px.ConfigError, match="another process is at work"):
+            Store(tmp_path / "other", {})

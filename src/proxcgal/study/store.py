@@ -51,21 +51,22 @@ class Store(Closing):
                 in it, or it cannot be written.
         """
         self._trials = folder / TRIALS
+        self._held = contextlib.ExitStack()
         with contextlib.ExitStack() as opened:
             try:
                 folder.mkdir(parents=True, exist_ok=True)
-                self._lock = os.open(folder, os.O_RDONLY)
-                opened.callback(os.close, self._lock)
+                handle = os.open(folder, os.O_RDONLY)
+                opened.callback(os.close, handle)
+                _lock(handle, folder)
                 self._open(folder, description)
             except OSError as error:
                 raise ConfigError(
                     f"--out {folder}: cannot be written: {error.strerror or error}"
                 ) from None
-            opened.pop_all()
+            self._held = opened.pop_all()
 
     def _open(self, folder: Path, description: Mapping[str, Any]) -> None:
         """Nobody else can come between what is found there and what is made of it."""
-        _lock(self._lock, folder)
         _refuse_other(folder, description)
         self._trials.mkdir(exist_ok=True)
         for half in self._trials.glob(".*"):  # of a process that was killed
@@ -74,8 +75,8 @@ class Store(Closing):
             write_json(folder / MANIFEST, description)
 
     def close(self) -> None:
-        """Lets other processes in; a killed process does so too."""
-        os.close(self._lock)
+        """Lets other processes in, the first time; a killed process does so too."""
+        self._held.close()
 
     def put(self, outcome: Outcome) -> None:
         """Once this returns, the outcome is found again after anything but a broken disk."""
