@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 
 import proxcgal as px
@@ -176,3 +177,21 @@ def test_the_page_has_the_campaigns_rows_and_no_other() -> None:
 def test_every_test_that_the_page_names_exists() -> None:
     for file, name in {test for entry in (*SHOWN_BY_TESTS, *GOALS) for test in entry.tests}:
         assert re.search(rf"\b{re.escape(name)}\b", (ROOT / file).read_text()), f"{file} {name}"
+
+
+def test_a_run_too_short_to_show_that_the_arm_recovers_is_refused() -> None:
+    wishes = Wishes(runs=1, seed=0, scenarios=("timing_ur10e",), overrides=("duration=1.0",))
+    with pytest.raises(ConfigError, match=r"--set duration=1: must be more than 1\.7 s"):
+        plan(wishes)
+
+
+def test_every_latency_is_drawn_and_no_figure_of_none() -> None:
+    table = pl.DataFrame(
+        {"robot": ["ur10e"] * 2, "row": ["all silent"] * 2, "error": [None, None],
+         "latency_ms": [150.0, 205.0]},
+        schema_overrides={"error": pl.String},
+    )  # fmt: skip
+    (axes,) = KIND.figures(table)["latency.png"].axes
+    dots = [x for line in axes.lines if line.get_marker() == "." for x in line.get_xdata()]
+    assert dots == [150.0, 205.0]
+    assert KIND.figures(table.with_columns(error=pl.lit("broken"))) == {}

@@ -303,3 +303,15 @@ def test_what_cannot_be_is_told(
     answer = call(*words)
     assert answer.code == 2
     assert told in answer.err
+
+
+def test_fig_9_shows_a_subject_that_both_controllers_met() -> None:
+    table = table_of(MEANS)
+    failed = table.with_columns(
+        error=pl.when((pl.col("subject") == 1) & (pl.col("controller") == "wb"))
+        .then(pl.lit("broken")).otherwise(None)
+    )  # fmt: skip
+    drawn = figures(failed)["trials.png"]
+    assert drawn.get_suptitle() == "Task 2, subject 2"
+    apart = table.filter((pl.col("controller") == "wb") == (pl.col("subject") == 1))
+    assert figures(apart)["trials.png"].get_suptitle() == "Task 2, subject 2"  # sm's alone

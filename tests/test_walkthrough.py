@@ -39,6 +39,7 @@ from proxcgal.sim.walk.stops import STRETCHED, worst_stops
 from proxcgal.sim.walk.taught import TaughtPath, clean, to_csv, to_trajectory, tool_positions
 from proxcgal.sim.walk.teach import REACHED, teach
 from proxcgal.sim.walk.wish import Wish
+from proxcgal.study.figures import GREY
 from proxcgal.study.ratings import read_ratings
 from proxcgal.study.walk import figures
 from proxcgal.study.walk_figures import trip_figure
@@ -446,9 +447,11 @@ def test_a_campaign_draws_the_same_operators_again_and_finds_no_false_trip(
 def test_a_stop_over_its_bound_is_inside_the_campaigns_figure() -> None:
     table = pl.DataFrame(
         {"error": [None], "tripped": ["tcp_speed"], "wish": ["overspeed"], "stop_time_s": [0.6],
-         "stop_distance_m": [0.7]},
+         "stop_distance_m": [0.7], "stop_time_bound_s": [0.5], "min_distance_m": [0.3]},
         schema_overrides={"error": pl.String},
     )  # fmt: skip
     axes = figures(table)["stops.png"].axes
     assert axes[0].get_xlim()[1] > 0.6
     assert axes[1].get_xlim()[1] > 0.7
+    bounds = [line.get_xdata()[0] for ax in axes for line in ax.lines if line.get_color() == GREY]
+    assert bounds == [0.5, 0.3]  # those of the runs

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 RUN, DEGRADED, HOLD, STOP = range(4)
 MODES = ("RUN", "DEGRADED", "HOLD", "STOP")
 SENSORS = 10  # of the array that a fault hits
+TICK_MS = 10  # a fault is answered at the next tick
 
 Fault = dict[str, object]  # a `[[fault]]` table, but for its times
 
@@ -121,3 +122,4 @@ ROWS: tuple[Row, ...] = (
     Row(name="mount 2 degrees off", faults=one("mount_turn"), least=RUN, most=RUN, within=0.0,
         refused=True),
 )  # fmt: skip
+ROW_OF = {row.name: row for row in ROWS}

@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import polars as pl
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
 from proxcgal.errors import ConfigError
 from proxcgal.sim.mounting import look
@@ -18,10 +16,10 @@ from proxcgal.sim.source import SimulatedSource
 from proxcgal.sim.world import World
 from proxcgal.study.analysis import Summary
 from proxcgal.study.campaign import Campaign, Trial, plain
-from proxcgal.study.fault_rows import DEGRADED, HOLD, MODES, ROWS, RUN, STOP, Fault, Row
-from proxcgal.study.figures import DPI, GREY
-from proxcgal.study.kind import Kind, Listing, Wishes
-from proxcgal.study.reliability import page
+from proxcgal.study.fault_figures import figures
+from proxcgal.study.fault_rows import MODES, ROW_OF, ROWS, RUN, STOP, TICK_MS, Fault, Row
+from proxcgal.study.fault_words import captions, listings, pages, verdicts
+from proxcgal.study.kind import Kind, Wishes
 from proxcgal.study.trials import identity, robot_of, simulate
 
 if TYPE_CHECKING:
@@ -44,9 +42,7 @@ COLUMNS = (
     "right", "latency_ms", "reached", "worst_mode", "told", "recovered", "same_commands",
     "no_flight", "qd_max",
 )  # fmt: skip
-TICK_MS = 10  # a fault is answered at the next tick
 _SLACK = 1e-9  # [s] a tick at the bound is in time
-_ROW_OF = {row.name: row for row in ROWS}
 
 
 def plan(wishes: Wishes) -> Campaign:
@@ -60,6 +56,7 @@ def plan(wishes: Wishes) -> Campaign:
     robots: set[str] = set()
     for source in wishes.scenarios or SCENES:
         base = load_scenario(source, (*SET, *wishes.overrides))
+        _refuse_short(base)
         robot = robot_of(base)
         setup = Setup.of(base, robot)
         sensors = len(setup.skin)
@@ -94,6 +91,18 @@ def plan(wishes: Wishes) -> Campaign:
         "set": list(wishes.overrides), **scenes,
     }  # fmt: skip
     return Campaign(description=description, trials=trials, perform=perform, columns=COLUMNS)
+
+
+def _refuse_short(base: Scenario) -> None:
+    """A run that ends sooner shows no recovery."""
+    longest = max(row.duration for row in ROWS)
+    least = LATEST + longest + RECOVERY
+    if base.duration <= least:
+        raise ConfigError(
+            f"--set duration={base.duration:g}: must be more than {least:g} s: a fault begins at "
+            f"{LATEST:g} s at the latest, lasts up to {longest:g} s, and the arm is to be free "
+            f"again {RECOVERY:g} s later"
+        )
 
 
 def _visible(setup: Setup) -> list[tuple[int, str]]:
@@ -131,7 +140,7 @@ def _assignment(faults: Any, start: float, end: float) -> str:
 
 def perform(trial: Trial, report: Report) -> Numbers:
     """One trial beside its row's requirements."""
-    row = _ROW_OF[str(trial.tags["row"])]
+    row = ROW_OF[str(trial.tags["row"])]
     if row.refused:
         return _refused(trial, report)
     log = _simulate(trial, trial.scenario, report)
@@ -212,96 +221,6 @@ def analyse(table: pl.DataFrame, campaign: Campaign) -> Summary:
     }
 
 
-def listings(summary: Summary) -> list[Listing]:
-    """Row, robot, runs, right mode, latency, worst."""
-    lines = []
-    for robot, rows in summary["robots"].items():
-        for name, found in rows.items():
-            row = _ROW_OF[name]
-            bound = f"{1000 * row.within:.0f} + {TICK_MS}" if row.least > RUN else "-"
-            lines.append(
-                (
-                    name, robot, _required(row), str(found["runs"]), str(found["right"]),
-                    _ms(found["latency_median_ms"]), _ms(found["latency_max_ms"]), bound,
-                    ", ".join(f"{mode} {n}" for mode, n in found["worst_modes"].items()),
-                )
-            )  # fmt: skip
-    return [
-        Listing(
-            caption="Every fault lasts 0.6 s (one missed deadline, a joint state that is not a "
-            "number: a tick) and begins at a random "
-            "moment, at a random sensor. Right: the required mode in time and no other, the "
-            "finding told, the arm free again 0.5 s after the fault; where no command may change, "
-            "the same commands as without it, to the bit. Latency from the fault's onset, told at "
-            "the next tick (10 ms).",
-            names=("fault", "robot", "required", "runs", "right", "median", "worst", "bound",
-                   "farthest mode"),
-            units=("", "", "", "", "", "ms", "ms", "ms", "runs"),
-            rows=lines, left=3,
-        )
-    ]  # fmt: skip
-
-
-def _required(row: Row) -> str:
-    if row.refused:
-        return "refused"
-    if row.least == row.most:
-        return MODES[row.least]
-    return f"{MODES[row.least]} or {MODES[row.most]}"
-
-
-def _ms(value: float | None) -> str:
-    return "-" if value is None else f"{value:.0f}"
-
-
-def verdicts(summary: Summary) -> list[str]:
-    """How many were right, and which rows were not."""
-    wrong = [
-        f"{name} on {robot} ({found['right']} of {found['runs']})"
-        for robot, rows in summary["robots"].items()
-        for name, found in rows.items()
-        if found["right"] < found["runs"]
-    ]
-    runs = sum(found["runs"] for rows in summary["robots"].values() for found in rows.values())
-    told = [f"The behaviour was right in {summary['right']} of {runs} runs."]
-    return [*told, "Not always right: " + "; ".join(wrong) + "."] if wrong else told
-
-
-def figures(table: pl.DataFrame) -> dict[str, Figure]:
-    """Latency of every run, row by row, beside its bound."""
-    done = table.filter(pl.col("error").is_null())
-    robots = done["robot"].unique(maintain_order=True).to_list()
-    rows = [row for row in ROWS if row.least > RUN]
-    figure = Figure(figsize=(4.2 * max(len(robots), 1) + 1.6, 4.6), dpi=DPI, layout="constrained")
-    FigureCanvasAgg(figure)
-    colours = {DEGRADED: "#E69F00", HOLD: "#D55E00", STOP: "#333333"}
-    for ax, robot in zip(
-        np.atleast_1d(figure.subplots(1, max(len(robots), 1), sharey=True)), robots, strict=True
-    ):
-        for height, row in enumerate(reversed(rows)):
-            own = done.filter(pl.col("robot") == robot, pl.col("row") == row.name)
-            latency = own["latency_ms"].drop_nulls().to_numpy()
-            spread = np.linspace(-0.25, 0.25, len(latency))
-            ax.plot(
-                latency, height + spread, ".", color=colours[row.least], markersize=4, alpha=0.6
-            )
-            ax.plot([1000 * row.within] * 2, [height - 0.4, height + 0.4], color=GREY, lw=2)
-        ax.set_title(robot)
-        ax.set_xlabel("time to the required mode [ms]")
-        ax.set_yticks(range(len(rows)), [row.name for row in reversed(rows)], fontsize=9)
-        ax.spines[["top", "right"]].set_visible(False)
-        ax.set_xlim(left=0.0)
-    return {"latency.png": figure}
-
-
-def captions(summary: Summary) -> dict[str, str]:
-    """What the figure shows."""
-    return {
-        "latency.png": "Time from the fault's onset to the required mode, one dot a run; grey: the "
-        "bound. Yellow: DEGRADED, red: HOLD, black: STOP."
-    }
-
-
 def worst(table: pl.DataFrame) -> list[str]:
     """Those that were wrong, then the slowest."""
     done = table.filter(pl.col("error").is_null())
@@ -309,11 +228,6 @@ def worst(table: pl.DataFrame) -> list[str]:
         "right", "latency_ms", "key", descending=[False, True, False], nulls_last=True
     )
     return order["key"].to_list()
-
-
-def pages(summary: Summary) -> dict[str, str]:
-    """What docs/reliability.md is a copy of."""
-    return {"reliability.md": page(ROWS, summary, {row.name: _required(row) for row in ROWS})}
 
 
 KIND = Kind(

@@ -66,9 +66,13 @@ def _trials(main: pl.DataFrame) -> Figure:
     """[WA] Fig. 9: a trial with the baseline and one with the whole body."""
     task = main["task"].unique(maintain_order=True).to_list()[-1]
     own = main.filter(pl.col("task") == task)
-    subject = min(own["subject"].to_list())
     names = [n for n in ("sm", "wb") if n in own["controller"].to_list()]
     names = names or own["controller"].unique(maintain_order=True).to_list()[:2]
+    met = [set(own.filter(pl.col("controller") == name)["subject"]) for name in names]
+    both = set.intersection(*met)
+    if not both:  # each with other subjects: one controller alone can be shown
+        names, both = names[:1], met[0]
+    subject = min(both)
     figure = _figure(5.2 * len(names), 5.0)
     figure.suptitle(f"{_LABELS.get(task, task)}, subject {subject}", fontsize=12, fontweight="bold")
     grid = figure.subplots(

@@ -52,8 +52,8 @@ def analyse(table: pl.DataFrame, campaign: Campaign) -> Summary:
         "settings": campaign.notes["settings"],
         "self_min_m": done["self_min_m"].min(),
         "self_under_limit": int((done["self_min_m"] < SELF_LIMIT_M).sum()),
-        "not_finite": int((~done["finite"]).sum()),
-        "limits_violated": int((~done["limits_kept"]).sum()),
+        "not_finite": len(done) - int(done["finite"].sum()),
+        "limits_violated": len(done) - int(done["limits_kept"].sum()),
         "wall_s": float(done["wall_s"].sum()),
         "simulated_s": float(sum(t.scenario.duration for t in campaign.trials)),
     }

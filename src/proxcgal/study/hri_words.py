@@ -209,7 +209,7 @@ def verdicts(summary: Summary) -> list[str]:
             f"Trials with a command that is not finite: {summary['not_finite']}; with a violated "
             f"joint limit: {summary['limits_violated']}."
         )
-    else:
+    elif summary["close_calls"]:
         told.append("No command was not finite, none violated a joint limit.")
     if summary["self_under_limit"]:
         told.append(

@@ -238,8 +238,8 @@ def page(rows: tuple[Row, ...], summary: dict[str, Any], required: dict[str, str
             modes = ", ".join(f"{mode} {n}" for mode, n in found["worst_modes"].items())
             lines.append(
                 f"| {row.name} | {required[row.name]} | {bound} | {robot} | {found['right']} of "
-                f"{found['runs']} | {_ms(found['latency_median_ms'])} | "
-                f"{_ms(found['latency_max_ms'])} | {modes} |"
+                f"{found['runs']} | {whole_ms(found['latency_median_ms'])} | "
+                f"{whole_ms(found['latency_max_ms'])} | {modes} |"
             )
     lines += ["", _LIMITS, "## Shown by tests", "", "| what goes wrong | what happens | shown by |"]
     lines.append("|---|---|---|")
@@ -276,5 +276,6 @@ def _tests(tests: tuple[tuple[str, str], ...]) -> str:
     return ", ".join(f"`{file}` {name}" for file, name in tests)
 
 
-def _ms(value: float | None) -> str:
+def whole_ms(value: float | None) -> str:
+    """A time for people [ms]; a dash where there is none."""
     return "-" if value is None else f"{value:.0f}"

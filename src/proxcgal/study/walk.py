@@ -29,10 +29,11 @@ if TYPE_CHECKING:
 COLUMNS = (
     "tripped", "own_function", "latency_cycles", "false_trip", "missed", "overrun", "stop_time_s",
     "stop_distance_m", "max_tcp_speed_mps", "least_distance_m", "playback_rms_m", "playback_max_m",
-    "playback_trips",
+    "playback_trips", "stop_time_bound_s", "min_distance_m",
 )  # fmt: skip
 COLOURS = {"overspeed": "#D55E00", "too_close": "#0072B2", "closing_fast": "#009E73"}
-LATENCY_BOUND = 1  # cycles
+#: Trials in which something tripped; without any that ended the column has no type.
+_STOPPED = pl.col("tripped").cast(pl.String) != "none"
 
 
 def plan(wishes: Wishes) -> Campaign:
@@ -91,6 +92,8 @@ def perform(trial: Trial, report: Report) -> Row:
         "playback_rms_m": None,
         "playback_max_m": None,
         "playback_trips": None,
+        "stop_time_bound_s": trial.scenario.guard.stop_time,
+        "min_distance_m": trial.scenario.guard.min_distance,
     }
     if tripped is None:
         keys = setup.scenario.playback
@@ -108,7 +111,7 @@ def analyse(table: pl.DataFrame, campaign: Campaign) -> Summary:
     wishes = {
         str(name): _of(part) for (name,), part in done.group_by(["wish"], maintain_order=True)
     }
-    stopped = done.filter(pl.col("tripped") != "none")
+    stopped = done.filter(_STOPPED)
     return {
         "robot": campaign.trials[0].scenario.robot,
         "redrawn": campaign.notes["redrawn"],
@@ -126,7 +129,7 @@ def analyse(table: pl.DataFrame, campaign: Campaign) -> Summary:
 
 
 def _of(part: pl.DataFrame) -> Summary:
-    stopped = part.filter(pl.col("tripped") != "none")
+    stopped = part.filter(_STOPPED)
     counts = part["tripped"].value_counts().sort("tripped")
     return {
         "runs": len(part),
@@ -206,23 +209,25 @@ def verdicts(summary: Summary) -> list[str]:
 
 
 def figures(table: pl.DataFrame) -> dict[str, Figure]:
-    """Distribution of stop times and distances."""
-    done = table.filter(pl.col("error").is_null(), pl.col("tripped") != "none")
+    """Distribution of stop times and distances; none where nothing stopped."""
+    done = table.filter(pl.col("error").is_null(), _STOPPED)
+    if done.is_empty():
+        return {}
     figure = Figure(figsize=(8.0, 3.7), dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
-    for ax, (column, label, bound) in zip(
+    for ax, (column, label, limit) in zip(
         figure.subplots(1, 2, sharey=True),
         (
-            ("stop_time_s", "stopping time [s]", 0.35),
-            ("stop_distance_m", "way of the tool [m]", 0.455),
+            ("stop_time_s", "stopping time [s]", "stop_time_bound_s"),
+            ("stop_distance_m", "way of the tool [m]", "min_distance_m"),
         ),
         strict=True,
     ):  # fmt: skip
         for name, colour in COLOURS.items():
-            values = np.sort(done.filter(pl.col("wish") == name)[column].drop_nulls().to_numpy())
+            values = done.filter(pl.col("wish") == name)[column].drop_nulls().to_numpy()
             if len(values):
-                share = np.arange(1, len(values) + 1) / len(values)
-                ax.step(values, share, where="post", color=colour, lw=1.6, label=name)
+                ax.ecdf(values, color=colour, lw=1.6, label=name)
+        bound = float(done[limit][0])  # one for all, by --set too
         ax.axvline(bound, color=GREY, lw=1.0, ls=DASHED)
         ax.annotate(
             "declared" if column == "stop_time_s" else "min_distance",
@@ -238,7 +243,7 @@ def figures(table: pl.DataFrame) -> dict[str, Figure]:
         ax.set_xlabel(label, fontsize=10)
         ax.tick_params(labelsize=9)
         ax.spines[["top", "right"]].set_visible(False)
-    figure.axes[0].set_ylabel("share of stops", fontsize=10)
+    figure.axes[0].set_ylabel("share of stops [-]", fontsize=10)
     figure.axes[0].set_ylim(0.0, 1.04)
     handles, labels = figure.axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False, fontsize=9)
@@ -250,7 +255,8 @@ def captions(summary: Summary) -> dict[str, str]:
     return {
         "stops.png": "Stopping times and ways of the tool, from the trip to rest, as simulated "
         "with weight and brakes: the share of stops up to each value, by what the operator did. "
-        "Dashed: the declared stopping time, and the minimum distance of 0.455 m."
+        f"Dashed: the declared stopping time of {summary['stop_time_bound_s']:g} s, and the "
+        f"minimum distance of {summary['min_distance_m']:g} m."
     }
 
 
