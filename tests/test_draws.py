@@ -1,5 +1,7 @@
 """Random scenes meet what is promised of them, and medians come with the right intervals."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -7,7 +9,7 @@ from scipy import stats
 import proxcgal as px
 from proxcgal.sim.scenario import load_scenario
 from proxcgal.sim.truth import Truth
-from proxcgal.study.bootstrap import median_interval
+from proxcgal.study.bootstrap import Interval, mean_interval, median_interval
 from proxcgal.study.draws import crosses, draw_scene, reachable
 
 
@@ -55,14 +57,17 @@ def test_a_line_crosses_a_plate_or_passes_it() -> None:
     assert not crosses(size, T_WO, *before)
 
 
-def test_the_medians_interval_is_that_of_scipy() -> None:
+@pytest.mark.parametrize(("of", "middle"), [(median_interval, np.median), (mean_interval, np.mean)])
+def test_intervals_are_those_of_scipy(
+    of: Callable[..., Interval | None], middle: Callable[..., float]
+) -> None:
     values = np.random.default_rng(4).normal(100.0, 30.0, 80).tolist()
-    interval = median_interval(values)
+    interval = of(values)
     assert interval is not None
-    assert interval.middle == np.median(values)
+    assert interval.middle == middle(values)
     oracle = stats.bootstrap(
-        (values,), np.median, method="percentile", n_resamples=10_000, rng=1
+        (values,), middle, method="percentile", n_resamples=10_000, rng=1
     ).confidence_interval
     assert interval.low == pytest.approx(oracle.low, abs=2.0)
     assert interval.high == pytest.approx(oracle.high, abs=2.0)
-    assert median_interval([]) is None
+    assert of([]) is None

@@ -2,11 +2,14 @@
 
 from typing import Any
 
+import numpy as np
 import polars as pl
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import stats
 
+from proxcgal.study.bootstrap import ratio_interval
 from proxcgal.study.memory_share import memory_sentences, memory_summary
 
 KINDS = ("in_view", "remembered", "forgotten", "never_seen")
@@ -76,3 +79,42 @@ def test_the_reason_says_what_was_known_of_the_closest_point(kind: str, words: s
     assert "at 5.2 s wrist_2_link is nearest" in reason
     assert words in reason
     assert "the nearest believed was 0.274 m off at forearm_link" in reason
+
+
+def test_the_share_closed_and_its_interval_are_those_of_scipy() -> None:
+    generator = np.random.default_rng(3)
+    lost = generator.normal(30.0, 20.0, 60)
+    regained = 0.4 * lost + generator.normal(0.0, 5.0, 60)
+    found = ratio_interval(regained, lost)
+    assert found.middle == pytest.approx(regained.sum() / lost.sum())
+    oracle = stats.bootstrap(
+        (regained, lost), lambda up, down, axis: up.sum(axis=axis) / down.sum(axis=axis),
+        method="percentile", paired=True, n_resamples=10_000, rng=1,
+    ).confidence_interval  # fmt: skip
+    assert found.low == pytest.approx(oracle.low, abs=0.01)
+    assert found.high == pytest.approx(oracle.high, abs=0.01)
+
+
+def told_of(cases: list[tuple[float, float]]) -> str:
+    """Of draws with these ends of wb and wb_memory; wb_known ends at 0.25 m."""
+    rows = [row for n, case in enumerate(cases) for row in draw(n, *case, "in_view")]
+    return memory_sentences("side", memory_summary(pl.DataFrame(rows, infer_schema_length=None)))[0]
+
+
+def test_few_draws_are_said_to_be_few() -> None:
+    assert told_of([(0.20, 0.20), (0.15, 0.15)]) == (
+        "side: at the end memory closes 0 % of what sensing costs (too few draws to say how sure "
+        "that is; +0.0 of +75.0 mm in the mean of 2 draws)."
+    )
+    assert "(95 % interval 0 to 0 %; " in told_of([(0.20, 0.1999999)] * 6)
+
+
+def test_a_cost_that_may_be_none_is_told_from_no_cost() -> None:
+    unsure = told_of([(0.10, 0.10), *[(0.27, 0.27)] * 6])
+    assert unsure == (
+        "side: at the end sensing costs 4.3 mm in the mean, over the draws too unsure to tell from "
+        "nothing: no share to close."
+    )
+    assert told_of([(0.27, 0.27)] * 6) == (
+        "side: at the end sensing costs nothing in the mean: no share to close."
+    )

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 RESAMPLES = 10_000
 CONFIDENCE = 0.95
+ENOUGH = 6  # values: of fewer, a resampled interval is no more than their range
 _PARTS = 20
 
 
@@ -40,7 +41,7 @@ def ratio_interval(
     """sum(above) / sum(below) over pairs, and its 95 % percentile bootstrap interval.
 
     Resamples whose sum below is not above 0 have no ratio; where more than 1 in 20 of them have
-    none, the interval has no ends worth telling either.
+    none, the sum below may as well be 0, and there is neither ratio nor interval.
     """
     up, down = np.asarray(above, np.float64), np.asarray(below, np.float64)
     if not len(up) or not down.sum() > 0.0:

@@ -10,7 +10,8 @@ import polars as pl
 from numpy.typing import NDArray
 
 from proxcgal.study.analysis import NOTHING_M, Summary
-from proxcgal.study.bootstrap import ratio_interval
+from proxcgal.study.bootstrap import ENOUGH, ratio_interval
+from proxcgal.study.paired import ends_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -38,11 +39,7 @@ def shares(table: pl.DataFrame, measure: str) -> Shares:
         table: a row a trial.
         measure: one of MEASURES.
     """
-    done = table.filter(pl.col("error").is_null(), pl.col(measure) < NOTHING_M)
-    ends = {
-        str(name): dict(part.select("draw", measure).iter_rows())
-        for (name,), part in done.group_by(["controller"], maintain_order=True)
-    }
+    ends = ends_of(table, measure)
     wb, known, memory = (ends.get(name, {}) for name in ("wb", "wb_known", "wb_memory"))
     draws = tuple(sorted(wb.keys() & known.keys() & memory.keys()))
     return Shares(
@@ -146,8 +143,10 @@ def memory_rows(scene: str, found: Summary | None) -> list[Sequence[str]]:
 def _percent(part: Summary) -> tuple[str, str, str]:
     if part["closed_share"] is None:
         return ("-", "-", "-")
-    middle, low, high = (100.0 * part[key] for key in ("closed_share", "low", "high"))
-    return f"{middle:.0f}", f"{low:.0f}", f"{high:.0f}"
+    middle, low, high = (
+        f"{round(100.0 * part[key]) + 0:d}" for key in ("closed_share", "low", "high")
+    )
+    return middle, low, high
 
 
 def memory_sentences(scene: str, found: Summary | None) -> list[str]:
@@ -157,18 +156,30 @@ def memory_sentences(scene: str, found: Summary | None) -> list[str]:
     told = []
     for measure, where in (("true_final_m", "at the end"), ("true_min_m", "at the nearest")):
         part = found[measure]
-        if part["closed_share"] is None:
-            told.append(f"{scene}: {where} sensing costs nothing in the mean: no share to close.")
-        else:
-            percent = _percent(part)
-            told.append(
-                f"{scene}: {where} memory closes {percent[0]} % of what sensing costs (95 % "
-                f"interval {percent[1]} to {percent[2]} %; {part['regained_mean_mm']:+.1f} of "
-                f"{part['lost_mean_mm']:+.1f} mm in the mean of {part['pairs']} draws)."
-            )
+        told.append(f"{scene}: {where} {_closed(part)}.")
         told += [
             f"{scene}, draw {case['draw']}: {where} nearer by {-case['apart_mm']:.0f} mm with "
             f"memory: {case['reason']}."
             for case in part["worse"]
         ]
     return told
+
+
+def _closed(part: Summary) -> str:
+    """What share memory closes, and how sure that is."""
+    lost = part["lost_mean_mm"]
+    if part["closed_share"] is None:
+        if lost <= 0.0:
+            return "sensing costs nothing in the mean: no share to close"
+        return (
+            f"sensing costs {lost:.1f} mm in the mean, over the draws too unsure to tell from "
+            "nothing: no share to close"
+        )
+    middle, low, high = _percent(part)
+    sure = f"95 % interval {low} to {high} %"
+    if part["pairs"] < ENOUGH:
+        sure = "too few draws to say how sure that is"
+    return (
+        f"memory closes {middle} % of what sensing costs ({sure}; {part['regained_mean_mm']:+.1f} "
+        f"of {lost:+.1f} mm in the mean of {part['pairs']} draws)"
+    )

@@ -27,11 +27,14 @@ class Pairs:
         return [float(apart) for apart in 1000.0 * (self.one - self.other)]
 
 
-def ends_of(table: pl.DataFrame) -> Ends:
-    """True distance at the end by controller and draw; trials that failed, or see nothing, not."""
-    done = table.filter(pl.col("error").is_null(), pl.col("true_final_m") < NOTHING_M)
+def ends_of(table: pl.DataFrame, measure: str = "true_final_m") -> Ends:
+    """True distance at the end, or another measure of it, by controller and draw [m].
+
+    Trials that failed, or have nothing to be distant from, are left out.
+    """
+    done = table.filter(pl.col("error").is_null(), pl.col(measure) < NOTHING_M)
     return {
-        str(name): dict(part.select("draw", "true_final_m").iter_rows())
+        str(name): dict(part.select("draw", measure).iter_rows())
         for (name,), part in done.group_by(["controller"], maintain_order=True)
     }
 

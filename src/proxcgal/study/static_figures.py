@@ -57,7 +57,7 @@ def memory_figure(scene: str, table: pl.DataFrame) -> Figure:
         scene: its name, above the figure.
         table: its trials.
     """
-    figure = Figure(figsize=(7.6, 3.9), dpi=DPI, layout="constrained")
+    figure = Figure(figsize=(7.6, 4.3), dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
     figure.suptitle(f"{scene}: memory against the cost of sensing", fontsize=12, fontweight="bold")
     titles = ("(a) at the end", "(b) at the nearest")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from proxcgal.study.analysis import SELF_LIMIT_M, Summary, shown
+from proxcgal.study.bootstrap import ENOUGH
 from proxcgal.study.campaign import plain
 from proxcgal.study.kind import Listing
 from proxcgal.study.memory_share import memory_rows, memory_sentences
@@ -64,8 +65,6 @@ def listings(summary: Summary) -> list[Listing]:
         ),
     ]  # fmt: skip
 
-
-ENOUGH = 6  # draws: of fewer, a resampled interval is no more than their range
 
 _COMPARISONS = {"gain_mm": "gain, wb - sm", "sensing_cost_mm": "sensing, wb_known - wb"}
 
