@@ -95,6 +95,12 @@ def test_blind_spots_are_said_plainly() -> None:
     assert "+20 mm in the median" in told
 
 
+def test_every_column_of_numbers_has_a_name_of_its_own() -> None:
+    for listing in listings(summary(run())):
+        assert all(listing.names)
+        assert len(set(listing.names)) == len(listing.names)
+
+
 def test_a_trap_is_told_with_what_holds_it() -> None:
     held = run(succeeded=False, outcome="aborted", reason="held off by the obstacle (x, cylinder)",
                holds_task="avoidance")  # fmt: skip

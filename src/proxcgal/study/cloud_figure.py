@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from proxcgal import _core
 from proxcgal.study.figures import DPI, LEGEND
-from proxcgal.study.pairs import PAIR_COLOUR, surface_points
+from proxcgal.study.pairs import PAIR_COLOUR, frame_3d, pair_arrow, surface_points
 from proxcgal.study.sweep_inputs import Inputs
 
 Array = NDArray[np.float64]
@@ -49,7 +49,7 @@ def cloud_figure(
     finest = _vertices(grid[-1])
     ax = figure.add_subplot(rows, 2, 1, projection="3d")
     _draw_points(ax, grid[-1].points_W, finest, near_W, sizes=(3.0, 0.06, 3.0))
-    _frame(ax, np.concatenate([grid[-1].points_W, finest]), bearing)
+    frame_3d(ax, np.concatenate([grid[-1].points_W, finest]), bearing)
     _caption(ax, 1.04, f"(a) all {len(grid[-1].points_W)} points sensed")
     everything_W = np.concatenate([finest, near_W])
     low, high = everything_W.min(axis=0), everything_W.max(axis=0)
@@ -63,12 +63,8 @@ def cloud_figure(
         ax.scatter(*surface_points(inputs.robot, inputs.q).T, zorder=0, **faint)
         size = float(np.clip(8000.0 / len(robot_W), 0.15, 6.0))
         _draw_points(ax, inputs.points_W[beside], robot_W, near_W, sizes=(7.0, size, 7.0))
-        tail_W, tip_W = np.asarray(pair.obstacle_W), np.asarray(pair.surface_W)
-        ax.quiver(
-            *tail_W, *(tip_W - tail_W), color=PAIR_COLOUR, linewidth=2.0, zorder=5,
-            arrow_length_ratio=min(0.5, 0.06 / max(pair.distance, 1e-9)),
-        )  # fmt: skip
-        _frame(ax, everything_W, bearing)
+        pair_arrow(ax, np.asarray(pair.obstacle_W), np.asarray(pair.surface_W))
+        frame_3d(ax, everything_W, bearing)
         _caption(ax, 1.04, f"({'abcdefgh'[place]}) {inputs.vertices} vertices a link")
         told = f"{pair.link}, {1000 * pair.distance:.1f} mm"
         _caption(ax, 0.98, told, fontsize=9, color=PAIR_COLOUR)
@@ -92,22 +88,6 @@ def _draw_points(
     order = (sizes[1], sizes[0], sizes[2])
     for zorder, ((cloud_W, colour), size) in enumerate(zip(clouds, order, strict=True), 1):
         ax.scatter(*cloud_W.T, s=size, color=colour, zorder=zorder, **plain)
-
-
-def _frame(ax: Any, everything_W: Array, bearing: float) -> None:
-    low, high = everything_W.min(axis=0), everything_W.max(axis=0)
-    ax.set_proj_type("ortho")
-    ax.view_init(elev=20.0, azim=np.rad2deg(bearing))
-    ax.set_box_aspect(high - low, zoom=0.98)
-    for setter, a, b in zip((ax.set_xlim, ax.set_ylim, ax.set_zlim), low, high, strict=True):
-        setter(a, b)
-    for name in "xyz":
-        getattr(ax, f"set_{name}label")(f"{name} [m]", fontsize=8, labelpad=-4)
-    ax.tick_params(labelsize=7, pad=-2)
-    ax.locator_params(nbins=4)
-    for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
-        axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
-        axis._axinfo["grid"].update(color="#E4E4E4", linewidth=0.5)
 
 
 def _caption(ax: Any, height: float, text: str, **style: Any) -> None:

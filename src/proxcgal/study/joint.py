@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import json
-from typing import Any
-
 import polars as pl
 
 from proxcgal.errors import ConfigError
@@ -133,12 +130,6 @@ def worst(table: pl.DataFrame) -> list[str]:
     """Runs with avoidance that came nearest to an obstacle, the nearest first."""
     ours = table.filter(pl.col("stack") != "no_avoidance", pl.col("error").is_null())
     return ours.sort("true_min_m", "key")["key"].to_list()
-
-
-def series_of(cell: str) -> dict[str, Any]:
-    """What a run's `series` holds, as `joint_rows` wrote it."""
-    series: dict[str, Any] = json.loads(cell)
-    return series
 
 
 KIND = Kind(

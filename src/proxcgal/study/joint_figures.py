@@ -147,6 +147,6 @@ def captions(summary: Summary) -> dict[str, str]:
 _CAPTION = (
     "the full stack from each initial configuration. Top: how fast each arm alone would move the "
     "tool, |J qd| of its own joints, obstacles known. Middle: the most active row of each task in "
-    "the same run. Bottom: true distance from the robot to the scene, known and sensed (the first "
-    "seed); a dot ends each run."
+    "the same run. Bottom: true distance from the robot to the scene, known, sensed, and sensed "
+    "with memory (the first seed); a dot ends each run."
 )

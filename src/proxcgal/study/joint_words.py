@@ -42,7 +42,7 @@ def listings(summary: Summary) -> list[Listing]:
             "manipulability of the KUKA and of the UR10e, as a share of each one's largest. Macro: "
             "share of the motion at the tool made by the KUKA. Own: least between own links.",
             names=("scene", "init", "stack", "end", "time", "error", "angle", "true", "altitude",
-                   "limit", "dexterity", "", "macro", "own"),
+                   "limit", "dexterity, KUKA", "dexterity, UR10e", "macro", "own"),
             units=("", "", "", "", "s", "m", "rad", "m", "m", "rad", "-", "-", "%", "m"),
             rows=[_known_row(run) for run in known], left=4,
         ),

@@ -79,12 +79,7 @@ def pair_figure(
 
 
 def _draw_pair(ax: Any, view: PairView, everything: Array, bearing: float) -> None:
-    low, high = everything.min(axis=0), everything.max(axis=0)
-    ax.set_proj_type("ortho")
-    ax.view_init(elev=20.0, azim=np.rad2deg(bearing))
-    ax.set_box_aspect(high - low, zoom=0.98)
-    for setter, a, b in zip((ax.set_xlim, ax.set_ylim, ax.set_zlim), low, high, strict=True):
-        setter(a, b)
+    frame_3d(ax, everything, bearing)
     ax.computed_zorder = False  # the arrow belongs on top, whatever lies before it
     plain: dict[str, Any] = {"linewidths": 0, "depthshade": False}
     ax.scatter(*view.obstacle_W.T, s=2.0, color="#5B93E6", zorder=1, **plain)
@@ -92,17 +87,28 @@ def _draw_pair(ax: Any, view: PairView, everything: Array, bearing: float) -> No
         ax.scatter(*view.context_W.T, s=0.8, color="#D4D4D4", zorder=2, **plain)
     size, colour, alpha = (1.6, "#606060", 0.6) if len(view.robot_W) > 200 else (14, "black", 1.0)
     ax.scatter(*view.robot_W.T, s=size, color=colour, alpha=alpha, zorder=3, **plain)
+    pair_arrow(ax, view.nearest_W, view.control_W)
+
+
+def pair_arrow(ax: Any, obstacle_W: Array, surface_W: Array) -> None:
+    """The closest pair as an arrow from the obstacle's point to the robot's, (3,) each [m]."""
+    apart_W = surface_W - obstacle_W
     ax.quiver(
-        *view.nearest_W,
-        *(view.control_W - view.nearest_W),
-        color=PAIR_COLOUR,
-        linewidth=2.0,
-        arrow_length_ratio=min(0.5, 0.06 / max(view.distance, 1e-9)),
-        zorder=5,
-    )
-    ax.set_xlabel("x [m]", fontsize=8, labelpad=-4)
-    ax.set_ylabel("y [m]", fontsize=8, labelpad=-4)
-    ax.set_zlabel("z [m]", fontsize=8, labelpad=-4)
+        *obstacle_W, *apart_W, color=PAIR_COLOUR, linewidth=2.0, zorder=5,
+        arrow_length_ratio=min(0.5, 0.06 / max(float(np.linalg.norm(apart_W)), 1e-9)),
+    )  # fmt: skip
+
+
+def frame_3d(ax: Any, everything_W: Array, bearing: float) -> None:
+    """Axes to scale round all points, (n, 3) [m], seen from a bearing [rad]; units on each."""
+    low, high = everything_W.min(axis=0), everything_W.max(axis=0)
+    ax.set_proj_type("ortho")
+    ax.view_init(elev=20.0, azim=np.rad2deg(bearing))
+    ax.set_box_aspect(high - low, zoom=0.98)
+    for setter, a, b in zip((ax.set_xlim, ax.set_ylim, ax.set_zlim), low, high, strict=True):
+        setter(a, b)
+    for name in "xyz":
+        getattr(ax, f"set_{name}label")(f"{name} [m]", fontsize=8, labelpad=-4)
     ax.tick_params(labelsize=7, pad=-2)
     ax.locator_params(nbins=4)
     for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
