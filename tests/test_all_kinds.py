@@ -39,4 +39,5 @@ def test_a_campaign_of_which_every_trial_fails_is_summed_up_all_the_same(name: s
         assert png(figure)
     assert isinstance(kind.captions(summary), dict)
     if kind.pages is not None:
-        assert kind.pages(summary)
+        (page,) = kind.pages(summary).values()
+        assert f"{len(failed)} more runs did not come to their end" in page

@@ -1,5 +1,6 @@
 """Trials become numbers, tables and figures: analytic curves whose numbers are known."""
 
+import errno
 import io
 import json
 from pathlib import Path
@@ -192,3 +193,16 @@ def test_the_same_figure_is_the_same_file(both: list[Any]) -> None:
         figures.png(figures.time_figure(both, title="", d_min=0.2, buffer=0.1)) for _ in range(2)
     }
     assert len(files) == 1
+
+
+def test_a_full_disk_is_told_with_the_file_that_had_no_room(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(OSError, match="No space left") as caught:
+        analysis.write_json(tmp_path / "summary.json", {})
+    assert caught.value.filename == str(tmp_path / "summary.json")
+    assert list(tmp_path.iterdir()) == []

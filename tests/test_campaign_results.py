@@ -14,6 +14,7 @@ import pytest
 import proxcgal as px
 from proxcgal.apps import cli
 from proxcgal.apps.kept import keep_worst
+from proxcgal.apps.moving import show_moving
 from proxcgal.sim.recording import read_recording
 from proxcgal.sim.replay import first_difference
 from proxcgal.sim.scenario import load_scenario
@@ -142,3 +143,11 @@ def test_a_report_is_made_again_from_the_folder(whole: Path) -> None:
     assert cli.main(["report", str(whole)]) == 0
     assert (whole / "report.html").read_bytes() == before
     assert before.count(b"<img ") == 2
+
+
+def test_a_picture_that_was_on_its_way_when_its_process_was_killed_goes(tmp_path: Path) -> None:
+    (tmp_path / ".drawing-x").mkdir()
+    (tmp_path / ".drawing-x" / "0.mcap").touch()
+    with Pool(1) as pool:
+        show_moving([], tmp_path, pool, quiet=True)
+    assert list(tmp_path.iterdir()) == []

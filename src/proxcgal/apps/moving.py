@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import shutil
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from proxcgal.study.pool import Pool
 
 MOVING, STILL = "motion.gif", "motion.png"
+_HALF = ".drawing-"  # begins the name of what is on its way
 
 
 def show_moving(trials: Sequence[Trial], folder: Path, pool: Pool, *, quiet: bool) -> None:
@@ -30,6 +32,8 @@ def show_moving(trials: Sequence[Trial], folder: Path, pool: Pool, *, quiet: boo
         pool: a worker of this machine draws.
         quiet: no progress on stderr.
     """
+    for half in folder.glob(f"{_HALF}*"):  # of a process that was killed
+        shutil.rmtree(half, ignore_errors=True)
     if not trials or (folder / MOVING).is_file():
         return
     with Progress("drawing", [1.0], "", quiet=quiet) as progress:
@@ -45,7 +49,7 @@ def _draw(trials: Sequence[Trial], folder: Path, report: Report) -> str:
     from proxcgal.study.trials import simulate
 
     steps = len(trials) + 1
-    with tempfile.TemporaryDirectory(prefix=".drawing-", dir=folder) as half:
+    with tempfile.TemporaryDirectory(prefix=_HALF, dir=folder) as half:
         try:
             recordings = []
             for row, trial in enumerate(trials):

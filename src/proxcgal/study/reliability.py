@@ -225,6 +225,8 @@ def page(rows: tuple[Row, ...], summary: dict[str, Any], required: dict[str, str
         + "; ".join(f"{len(own)} rows on {robot}" for robot, own in robots.items())
         + f", seeds from {summary.get('seed', 0)} on, {summary.get('runs', '?')} runs a row.\n"
     )
+    if failed := len(summary.get("failed", ())):
+        lines.append(f"{failed} more runs did not come to their end and are not counted.\n")
     lines.append(
         "| fault | required | bound ms | robot | right | median ms | worst ms | farthest |"
     )
