@@ -25,6 +25,7 @@ STYLES: dict[str, dict[str, Any]] = {
     "paper": {"linestyle": "-", "marker": "o"},
     "fast": {"linestyle": DASHED, "marker": "s", "markerfacecolor": "white"},
 }
+_CYCLE: dict[str, Any] = {"color": GREY, "linewidth": 1.0, "linestyle": (0, (1, 1.5))}
 METHOD_NAMES = {"paper": "literal (paper)", "fast": "accelerated (fast)"}
 
 
@@ -63,12 +64,7 @@ def _draw_times(ax: Axes, cells: Sequence[Cell]) -> None:
                 [cell.vertices for cell in curve], [cell.median_us / 1000.0 for cell in curve],
                 color=CLOUD_COLOURS[cloud], markersize=4.5, linewidth=1.5, **style,
             )  # fmt: skip
-    ax.axhline(CYCLE_US / 1000.0, color=GREY, linewidth=1.0, linestyle=(0, (1, 1.5)), zorder=1)
-    ax.annotate(
-        f"sensors' cycle, {CYCLE_US / 1000.0:g} ms", (0.02, CYCLE_US / 1000.0),
-        xycoords=("axes fraction", "data"), xytext=(0, 3), textcoords="offset points",
-        fontsize=8, color=GREY,
-    )  # fmt: skip
+    ax.axhline(CYCLE_US / 1000.0, zorder=1, **_CYCLE)
     ax.set_xscale("log")
     ax.set_yscale("log")
     for axis in (ax.xaxis, ax.yaxis):
@@ -80,7 +76,7 @@ def _draw_times(ax: Axes, cells: Sequence[Cell]) -> None:
 
 
 def _legend(cells: Sequence[Cell]) -> list[Line2D]:
-    """A row of clouds with their sizes above a row of methods, column by column."""
+    """A row of clouds with their sizes above methods and the cycle, column by column."""
     clouds = []
     for cloud, colour in CLOUD_COLOURS.items():
         own = sorted((c for c in cells if c.cloud == cloud), key=lambda c: c.robot)
@@ -92,6 +88,8 @@ def _legend(cells: Sequence[Cell]) -> list[Line2D]:
         Line2D([], [], color=GREY, markersize=4.5, linewidth=1.5, label=METHOD_NAMES[name], **style)
         for name, style in STYLES.items()
     ]
+    label = f"sensors' cycle, {CYCLE_US / 1000.0:g} ms"
+    methods.append(Line2D([], [], label=label, **_CYCLE))
     nothing = Line2D([], [], linestyle="none", label=" ")
     columns = zip_longest(clouds, methods, fillvalue=nothing)
     return [handle for column in columns for handle in column]
