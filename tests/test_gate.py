@@ -46,7 +46,7 @@ class Served:
 
     def get(self, path: str = "", **headers: str) -> Any:
         request = urllib.request.Request(f"http://127.0.0.1:{self.port}/{path}", headers=headers)
-        return urllib.request.urlopen(request, timeout=10)
+        return urllib.request.urlopen(request, timeout=60)
 
     def set_slider(self, value: object, control: Any = None) -> dict[str, Any]:
         uuid = (control or self.slider)._impl.uuid
@@ -73,7 +73,7 @@ def say(connection: ClientConnection, message: object) -> None:
 
 def hear(connection: ClientConnection) -> None:
     while True:
-        connection.recv(timeout=5.0)
+        connection.recv(timeout=60.0)
 
 
 def flood(connection: ClientConnection) -> None:
@@ -81,7 +81,7 @@ def flood(connection: ClientConnection) -> None:
         say(connection, CAMERA)
 
 
-def until(condition: Any, seconds: float = 5.0) -> bool:
+def until(condition: Any, seconds: float = 60.0) -> bool:
     end = clock.monotonic() + seconds
     while clock.monotonic() < end:
         if condition():
