@@ -5,6 +5,7 @@ import time as clock
 import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -16,6 +17,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 import proxcgal as px
+from proxcgal.apps import results, view
 from proxcgal.apps.view import address, checked_token
 from proxcgal.apps.view.gate import Gate, close, serve
 from proxcgal.apps.view.messages import Bounds, between, one_of, switch
@@ -294,3 +296,31 @@ def test_what_cannot_be_viewed_is_told_in_a_line(
     assert answer.code == 2
     assert message in answer.err
     assert "Traceback" not in answer.err
+
+
+def test_the_address_is_told_once_there_is_something_to_see(
+    call: Callable[..., Any], arm_cell: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen = []
+
+    def attend(page: Any) -> None:
+        handles = page._server.scene._handle_from_node_name
+        seen.extend(name for name in handles if name.startswith("/arm/"))
+
+    monkeypatch.setattr(view, "_attend", attend)
+    monkeypatch.setattr(view.os, "nice", lambda _: 0)  # of this process: for good
+    answer = call("view", arm_cell, "--port", "0")
+    assert answer.code == 0
+    assert answer.out.startswith("http://127.0.0.1:")
+    assert {"/arm/0_base_link", "/arm/1_upper"} <= set(seen)
+
+
+def test_a_simulation_that_cannot_begin_is_told_without_an_address(
+    call: Callable[..., Any], arm_cell: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(view.os, "nice", lambda _: 0)
+    monkeypatch.setattr(results, "check", lambda *_, **__: None)  # else it is told before
+    answer = call("view", arm_cell, "--port", "0", "--set", "q0=[9.0, 0.0]")
+    assert answer.code == 2
+    assert answer.out == ""
+    assert "q0" in answer.err
