@@ -75,7 +75,7 @@ class ControllerNode(Node):
             second == "preempt",
         )  # fmt: skip
         self._clocks = Clocks(self)
-        self.goals = LiveGoals(setup.robot, self._frame, self._rules)
+        self.goals = LiveGoals(setup.robot, self._frame, self._rules, self.law.config.period)
         self.source = RosSource(self, executor, self.setup, self._clocks, self.goals, running)
         self._views = Views(setup.robot, setup.skin)
         self._sensors = [mount.name for mount in setup.skin.mounts]

@@ -45,7 +45,7 @@ def test_the_12_joint_robot_takes_goals_from_its_configurations(
         assert client.until(lambda reason=reason: any(reason in r for r in client.refusals()))
 
     # A short way is gone to its end.
-    ended = client.result(client.send(goal(z=0.1)))
+    ended = client.result(client.send(goal(z=0.1, init_config_name="free")))
     assert (ended.result.result, ended.status) == ("succeeded", GoalStatus.STATUS_SUCCEEDED)
     assert ended.result.position_error <= 0.03
     assert processes.end("joint") == 0
