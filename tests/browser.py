@@ -20,6 +20,7 @@ FLAGS = [
 ]  # fmt: skip
 #: Pictures that the tests make are kept here, where it is set.
 PICTURES = os.environ.get("PROXCGAL_PICTURES")
+PATIENCE = 120.0  # [s] for what has to come, however busy the machine is
 SIZE = (1100, 680) if PICTURES else (800, 520)  # [px]
 
 
@@ -82,13 +83,15 @@ def chromium(width: int = SIZE[0], height: int = SIZE[1]) -> Iterator[Callable[[
             user, executable_path=program, args=FLAGS,
             viewport={"width": width, "height": height},
         )  # fmt: skip
+        context.set_default_timeout(1000.0 * PATIENCE)
         try:
             yield lambda: Tab(context.new_page())
         finally:
             context.close()
 
 
-def until(condition: Callable[[], Any], seconds: float = 30.0) -> bool:
+def until(condition: Callable[[], Any], seconds: float = PATIENCE) -> bool:
+    """Waits until it is so; false where it never came to that."""
     end = clock.monotonic() + seconds
     while clock.monotonic() < end:
         if condition():

@@ -50,7 +50,7 @@ class Live:
     def passed(self, seconds: float) -> None:
         """Waits for that much simulated time."""
         end = self.moment.elapsed + seconds
-        assert until(lambda: self.moment.elapsed >= end, 90.0)
+        assert until(lambda: self.moment.elapsed >= end)
 
     def press(self, label: str) -> None:
         self.tab.page.get_by_role("button", name=label, exact=True).first.click()
@@ -80,7 +80,7 @@ class Live:
             for share in np.arange(1, steps + 1) / steps:
                 mouse.move(x0 + share * (x1 - x0), y0 + share * (y1 - y0))
                 self.tab.page.wait_for_timeout(1000.0 * seconds / steps)
-            if until(lambda: np.linalg.norm(handle.position - begin) > 0.05, 2.0):  # noqa: B023
+            if until(lambda: np.linalg.norm(handle.position - begin) > 0.05, 10.0):  # noqa: B023
                 return
             mouse.up()
         raise AssertionError("the handle can't be dragged")

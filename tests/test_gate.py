@@ -5,6 +5,7 @@ import time as clock
 import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -16,6 +17,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 import proxcgal as px
+from proxcgal.apps import results, view
 from proxcgal.apps.view import address, checked_token
 from proxcgal.apps.view.gate import Gate, close, serve
 from proxcgal.apps.view.messages import Bounds, between, one_of, switch
@@ -46,7 +48,7 @@ class Served:
 
     def get(self, path: str = "", **headers: str) -> Any:
         request = urllib.request.Request(f"http://127.0.0.1:{self.port}/{path}", headers=headers)
-        return urllib.request.urlopen(request, timeout=10)
+        return urllib.request.urlopen(request, timeout=60)
 
     def set_slider(self, value: object, control: Any = None) -> dict[str, Any]:
         uuid = (control or self.slider)._impl.uuid
@@ -73,7 +75,7 @@ def say(connection: ClientConnection, message: object) -> None:
 
 def hear(connection: ClientConnection) -> None:
     while True:
-        connection.recv(timeout=5.0)
+        connection.recv(timeout=60.0)
 
 
 def flood(connection: ClientConnection) -> None:
@@ -81,7 +83,7 @@ def flood(connection: ClientConnection) -> None:
         say(connection, CAMERA)
 
 
-def until(condition: Any, seconds: float = 5.0) -> bool:
+def until(condition: Any, seconds: float = 60.0) -> bool:
     end = clock.monotonic() + seconds
     while clock.monotonic() < end:
         if condition():
@@ -294,3 +296,31 @@ def test_what_cannot_be_viewed_is_told_in_a_line(
     assert answer.code == 2
     assert message in answer.err
     assert "Traceback" not in answer.err
+
+
+def test_the_address_is_told_once_there_is_something_to_see(
+    call: Callable[..., Any], arm_cell: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen = []
+
+    def attend(page: Any) -> None:
+        handles = page._server.scene._handle_from_node_name
+        seen.extend(name for name in handles if name.startswith("/arm/"))
+
+    monkeypatch.setattr(view, "_attend", attend)
+    monkeypatch.setattr(view.os, "nice", lambda _: 0)  # of this process: for good
+    answer = call("view", arm_cell, "--port", "0")
+    assert answer.code == 0
+    assert answer.out.startswith("http://127.0.0.1:")
+    assert {"/arm/0_base_link", "/arm/1_upper"} <= set(seen)
+
+
+def test_a_simulation_that_cannot_begin_is_told_without_an_address(
+    call: Callable[..., Any], arm_cell: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(view.os, "nice", lambda _: 0)
+    monkeypatch.setattr(results, "check", lambda *_, **__: None)  # else it is told before
+    answer = call("view", arm_cell, "--port", "0", "--set", "q0=[9.0, 0.0]")
+    assert answer.code == 2
+    assert answer.out == ""
+    assert "q0" in answer.err

@@ -77,7 +77,7 @@ def test_a_person_s_hand_that_is_dragged_is_what_true_distances_run_to(
         live.drag((0.0, 0.0, 0.2))
         live.tab.page.mouse.up()
         live.press("run")
-        assert until(lambda: live.moment.solids_W[hand][2, 3] > before[2] + 0.05, 60.0)
+        assert until(lambda: live.moment.solids_W[hand][2, 3] > before[2] + 0.05)
         live.press("pause")
         assert until(lambda: not live.page.told.running)
         setup, moment = Setup.of(live.scenario), live.moment
@@ -94,7 +94,7 @@ def test_an_obstacle_that_is_dragged_before_the_joint_robot_is_known_there(
         before, q = live.moment, live.moment.q
         live.drag((-0.4, 0.0, 0.0))
         live.tab.page.mouse.up()
-        assert until(lambda: live.moment.solids_W[row][0, 3] < before.solids_W[row][0, 3] - 0.2, 60)
+        assert until(lambda: live.moment.solids_W[row][0, 3] < before.solids_W[row][0, 3] - 0.2)
         assert live.moment.seen < before.seen
         assert np.abs(live.moment.q - q).max() > 0.0
 

@@ -1,5 +1,6 @@
 """A recording in the browser: the time line moves the arm, other settings are shown beside it."""
 
+import asyncio
 import subprocess
 import sys
 from collections.abc import Callable
@@ -75,6 +76,31 @@ def test_the_time_line_scrubs(
         assert tab.errors == []
         assert gate.dropped == 0
         tab.page.close()
+    finally:
+        page.close()
+        close(server)
+
+
+def test_the_buttons_go_from_moment_to_moment_whatever_the_tick(tmp_path: Path) -> None:
+    scenario = load_scenario("front_plane", ["duration=0.5", "simulation.control_hz=250.0"])
+    with Recorder(tmp_path / "wb.mcap") as recorder:
+        run_trial(scenario, "wb", recorder=recorder)
+    run = replayed(read_recording(tmp_path / "wb.mcap"), 15.0)
+    server, gate = serve("127.0.0.1", 0, label="replay")
+    page = ReplayPage(server, gate, run, None, "")
+
+    async def nothing() -> None: ...
+
+    def press(button: str) -> int:
+        page._press(button)
+        loop = page._line._impl.gui_api._event_loop  # where the time line's change is heard
+        asyncio.run_coroutine_threadsafe(nothing(), loop).result(60.0)
+        return page.row
+
+    try:
+        last = len(run.moments) - 1
+        assert [press("next") for _ in range(last)] == list(range(1, last + 1))
+        assert [press("back") for _ in range(last)] == list(range(last - 1, -1, -1))
     finally:
         page.close()
         close(server)

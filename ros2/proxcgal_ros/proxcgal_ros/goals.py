@@ -6,42 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Protocol
 
-from proxcgal.apps.joint_goals import (
-    AT_REST,
-    BASE,
-    END_EFFECTOR,
-    KEPT_RESULTS,
-    STOPPED_AFTER,
-    GoalFeedback,
-    GoalRefusedError,
-    GoalResult,
-    JointGoal,
-    State,
-    goal_pose,
-    reach_of,
-    reach_problem,
-)
-from proxcgal.sim.finish import Outcome, pose_errors
-
-__all__ = [
-    "AT_REST",
-    "BASE",
-    "END_EFFECTOR",
-    "KEPT_RESULTS",
-    "STOPPED_AFTER",
-    "GoalFeedback",
-    "GoalRefusedError",
-    "GoalResult",
-    "GoalServer",
-    "JointGoal",
-    "Outcome",
-    "State",
-    "goal_pose",
-    "goal_problems",
-    "pose_errors",
-    "reach_of",
-    "reach_problem",
-]
+from proxcgal.apps.joint_goals import END_EFFECTOR, GoalFeedback, GoalResult, JointGoal
 
 
 class GoalServer(Protocol):

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-import numpy as np
 from rclpy.executors import Executor
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
-from proxcgal.apps import joint_server
+from proxcgal.apps.joint_goals import GoalFeedback, GoalResult, JointGoal
+from proxcgal.apps.joint_server import JointRobotServer
 from proxcgal_ros import topics
 from proxcgal_ros.action import MoveRobotAction
 from proxcgal_ros.convert import header, joint_message
-from proxcgal_ros.goals import GoalFeedback, GoalResult, JointGoal
 
 JOINTS_HZ = 50.0
 
@@ -21,7 +20,7 @@ JOINTS_HZ = 50.0
 class JointGoals:
     """`JointRobotServer` as the action takes it."""
 
-    def __init__(self, server: joint_server.JointRobotServer) -> None:
+    def __init__(self, server: JointRobotServer) -> None:
         """Args: who pursues the goals."""
         self._server = server
 
@@ -61,9 +60,8 @@ class JointNode(Node):
         """
         super().__init__("proxcgal_joint")
         self._executor, self._running = executor, running
-        self._server = joint_server.JointRobotServer(scenario, changes, second=second)
+        self._server = JointRobotServer(scenario, changes, second=second)
         self._names = list(self._server.robot.joint_names)
-        self._last = self._server.q
         self._joints = self.create_publisher(JointState, topics.JOINT_STATES, topics.RELIABLE_QOS)
         self.create_timer(1.0 / JOINTS_HZ, self._tell)
         self._action = MoveRobotAction(self, JointGoals(self._server))
@@ -79,7 +77,6 @@ class JointNode(Node):
         self._executor.spin_once(timeout_sec=0.1)
 
     def _tell(self) -> None:
-        q = self._server.q
-        qd, self._last = (q - self._last) * JOINTS_HZ, q
         now = int(self.get_clock().now().nanoseconds)
-        self._joints.publish(joint_message(self._names, q, np.asarray(qd), header(now, "")))
+        q, qd = self._server.q, self._server.qd
+        self._joints.publish(joint_message(self._names, q, qd, header(now, "")))

@@ -2,33 +2,27 @@
 
 from __future__ import annotations
 
-import math
-from collections import OrderedDict
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from proxcgal import _core
-from proxcgal.models import Robot
-from proxcgal.sim.ticks import TickInput, TickResult
-from proxcgal_ros.goals import (
-    AT_REST,
+from proxcgal.apps.goal_ledger import GoalLedger, Pursued
+from proxcgal.apps.joint_goals import (
     BASE,
-    KEPT_RESULTS,
-    STOPPED_AFTER,
     GoalFeedback,
     GoalRefusedError,
     GoalResult,
     JointGoal,
-    Outcome,
-    State,
     goal_pose,
-    goal_problems,
-    pose_errors,
     reach_of,
     reach_problem,
 )
+from proxcgal.models import Robot
+from proxcgal.sim.finish import Outcome, pose_errors
+from proxcgal.sim.ticks import TickInput, TickResult
+from proxcgal_ros.goals import goal_problems
 
 Array = NDArray[np.float64]
 
@@ -46,13 +40,9 @@ class Rules:
     preempt: bool = True  #: a goal replaces the one that is pursued; else it is refused
 
 
-@dataclass(slots=True)
-class _Active:
-    number: int
+@dataclass(slots=True, kw_only=True)
+class _Goal(Pursued):
     T_WT: Array
-    begun: float
-    state: State = "executing"
-    cancelled: float = math.inf  # [s] when
 
 
 class LiveGoals:
@@ -61,19 +51,26 @@ class LiveGoals:
     Without one the arm is held where the last one ended.
     """
 
-    def __init__(self, robot: Robot, base_frame: str, rules: Rules) -> None:
-        """Args: the frame that its base is called by, beside the thesis's name."""
+    def __init__(self, robot: Robot, base_frame: str, rules: Rules, period: float) -> None:
+        """Nothing is pursued.
+
+        Args:
+            robot: the arm.
+            base_frame: that its base is called by, beside the thesis's name.
+            rules: when goals end.
+            period: [s] the most that commands may change within one tick counts by.
+        """
         self._robot = robot
         self._reach = reach_of(robot)
         self._base_frames = (BASE, base_frame)
         self.rules = rules
-        self._count = 0
-        self._active: _Active | None = None
-        self._results: OrderedDict[int, GoalResult] = OrderedDict()
+        self._period = period
+        self._goals: GoalLedger[_Goal] = GoalLedger()
         self._held: Array | None = None
         self._tool: Array | None = None
         self._q: Array | None = None
         self._time = 0.0
+        self._ticked = -np.inf  # [s] when the last tick was
         self._last: TickResult | None = None
 
     def send_goal(self, goal: JointGoal) -> int:
@@ -87,31 +84,29 @@ class LiveGoals:
             problems.append("no joint states yet")
         if self._last is not None and self._last.mode == _STOP:
             problems.append("the monitor has stopped the arm; it takes goals again after a reset")
-        if not self.rules.preempt and self._active is not None:
-            problems.append(f"goal {self._active.number} is being pursued")
+        if not self.rules.preempt and self._goals.active is not None:
+            problems.append(f"goal {self._goals.active.number} is being pursued")
         if not problems and self._tool is not None:
             T_WT = goal_pose(goal, self._tool)
             far = reach_problem(self._reach, T_WT)
             if far is None:
-                self._count += 1
-                if self._active is not None:
-                    self._end("cancelled", f"preempted by goal {self._count}")
-                self._active = _Active(self._count, T_WT, self._time)
-                return self._count
+                number = self._goals.next
+                if self._goals.active is not None:
+                    self._end("cancelled", f"preempted by goal {number}")
+                return self._goals.take(_Goal(number=number, begun=self._time, T_WT=T_WT))
             problems.append(far)
         raise GoalRefusedError("\n".join(problems))
 
     def cancel(self, number: int) -> bool:
-        """Brakes within limits; the goal has ended once the arm rests. False: it had ended."""
-        active = self._active
-        if active is None or active.number != number or active.state == "cancelling":
-            return False
-        active.state, active.cancelled = "cancelling", self._time
-        return True
+        """Brakes within limits; the goal ends once the arm has braked. False: it had ended.
+
+        Then it rests, or a task above `reach` still moves it, which the goal's reason says.
+        """
+        return self._goals.cancel(number, self._time, np.asarray(self._robot.qdd_max))
 
     def feedback(self, number: int) -> GoalFeedback | None:
         """How it is doing; None where it is not pursued."""
-        active = self._active
+        active = self._goals.active
         if active is None or active.number != number or self._tool is None or self._q is None:
             return None
         qd = np.zeros_like(self._q) if self._last is None else self._last.qd
@@ -123,7 +118,7 @@ class LiveGoals:
 
     def result(self, number: int) -> GoalResult | None:
         """How it ended; None while it has not."""
-        return self._results.get(number)
+        return self._goals.result(number)
 
     def at(self, time: float, q: Array) -> Array:
         """(4, 4) T_WT that the tick at this time is given, the arm being at q (n_q,)."""
@@ -132,7 +127,7 @@ class LiveGoals:
             self._q, self._tool = q, np.asarray(self._robot.tool_pose(q))
         if self._tool is None:  # not a number from the first: the tick says so
             return np.eye(4)
-        active = self._active
+        active = self._goals.active
         if active is not None and active.state == "executing":
             return active.T_WT
         if self._held is None or active is not None:
@@ -141,8 +136,9 @@ class LiveGoals:
 
     def after(self, given: TickInput, result: TickResult) -> None:
         """Whether the goal has ended with this tick."""
+        passed, self._ticked = min(given.time - self._ticked, self._period), given.time
         self._last = result
-        active = self._active
+        active = self._goals.active
         if active is None or self._tool is None:
             return
         errors = pose_errors(self._tool, active.T_WT)
@@ -150,33 +146,26 @@ class LiveGoals:
             reasons = ", ".join(sorted({found.reason for found in result.findings}))
             self._end("aborted", f"the monitor stopped the arm: {reasons}")
         elif active.state == "cancelling":
-            resting = bool(np.abs(result.qd).max() <= AT_REST)
-            if resting or self._time - active.cancelled > STOPPED_AFTER:
-                self._end("cancelled", "cancelled by the client")
+            why = self._goals.braked(given.time, passed, result)
+            if why is not None:
+                self._end("cancelled", why)
         elif errors[0] <= self.rules.position_tolerance and errors[1] <= self.rules.angle_tolerance:
             self._end("succeeded", "the tool is at the goal")
             self._held = active.T_WT
         elif given.time - active.begun > self.rules.timeout:
-            near = f" held off by the obstacle, {result.seen:.3f} m away"
-            why = near if result.activation() > HELD_OFF else ""
-            self._end("aborted", f"not reached within {self.rules.timeout:g} s{why and ':'}{why}")
+            told = f"not reached within {self.rules.timeout:g} s"
+            if result.activation() > HELD_OFF:
+                told += f": held off by the obstacle, {result.seen:.3f} m away"
+            self._end("aborted", told)
 
     def close(self) -> None:
         """The node ends."""
-        if self._active is not None:
+        if self._goals.active is not None:
             self._end("aborted", "the node was shut down")
 
     def _end(self, outcome: Outcome, reason: str) -> None:
-        """The one place where a goal ends."""
-        active = self._active
+        active = self._goals.active
         assert active is not None
         assert self._tool is not None
-        assert active.number not in self._results
         self._held = self._tool
-        self._results[active.number] = GoalResult(
-            active.number, outcome, reason, self._time - active.begun,
-            *pose_errors(self._tool, active.T_WT),
-        )  # fmt: skip
-        while len(self._results) > KEPT_RESULTS:
-            self._results.popitem(last=False)
-        self._active = None
+        self._goals.end(outcome, reason, self._time, pose_errors(self._tool, active.T_WT))

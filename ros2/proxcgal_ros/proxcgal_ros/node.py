@@ -31,12 +31,11 @@ from proxcgal_ros.clocks import Clocks
 from proxcgal_ros.convert import cloud_message, header, pose_message, proximity_message
 from proxcgal_ros.display import Views, diagnostics, markers, pair_marker
 from proxcgal_ros.live_goals import LiveGoals, Rules
+from proxcgal_ros.pacing import CloudPace, Pace
 from proxcgal_ros.source import RosSource
 
 LIVE_CONTROLLERS = tuple(name for name in CONTROLLERS if name != "wb_known")
 VIEWS_HZ = 2.0  # fields of view are many lines
-PATIENCE = 1.25  # of the clouds' period
-EARLY = 0.75  # of a display's period: what comes at its rate, but not evenly, is not left out
 
 
 class ControllerNode(Node):
@@ -69,18 +68,17 @@ class ControllerNode(Node):
         self.law = self.setup.make_controller(controller)
         frame = parameters.fixed_text(self, "frame_id", "", "of the robot's base; empty: its name")
         self._frame = frame or topics.base_frame(setup.robot)
-        self._hz = {key: numbers[key] for key in ("cloud_hz", "diagnostics_hz")}
+        self._clouds, self._told = CloudPace(numbers["cloud_hz"]), Pace(numbers["diagnostics_hz"])
+        self._viewed = Pace(VIEWS_HZ)
         self._rules = Rules(
             numbers["position_tolerance"], numbers["angle_tolerance"], numbers["goal_timeout"],
             second == "preempt",
         )  # fmt: skip
         self._clocks = Clocks(self)
-        self.goals = LiveGoals(setup.robot, self._frame, self._rules)
+        self.goals = LiveGoals(setup.robot, self._frame, self._rules, self.law.config.period)
         self.source = RosSource(self, executor, self.setup, self._clocks, self.goals, running)
         self._views = Views(setup.robot, setup.skin)
         self._sensors = [mount.name for mount in setup.skin.mounts]
-        self._shown = {"cloud_hz": -np.inf, "diagnostics_hz": -np.inf, "views": -np.inf}
-        self._cloud_ns = 0  # stamp of the last cloud
         self._goal_told: object = None
         out = topics.RELIABLE_QOS
         keep = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -157,37 +155,20 @@ class ControllerNode(Node):
         """After the command has gone out: what others look at."""
         head = header(self.source.q_stamp_ns, self._frame)
         self._proximity.publish(proximity_message(result, head))
-        if self._cloud_due(given.time):
-            self._cloud_ns = max(self.source.scan_stamps_ns.values())
-            seen = header(self._cloud_ns, self._frame)
+        if self._clouds.due_with(given.time, self.source.scan_stamps_ns):
+            seen = header(self._clouds.newest_ns, self._frame)
             origins = np.asarray(self.law.cloud_origins())
             self._cloud.publish(cloud_message(np.asarray(self.law.cloud_W()), origins, seen))
             if self._markers.get_subscription_count():
                 shown = [pair_marker(result, head)]
-                if self._turn("views", given.time, VIEWS_HZ):
+                if self._viewed.due(given.time):
                     shown.append(self._views.marker(given.q, head))
                 self._markers.publish(markers(*shown))
-        if self._turn("diagnostics_hz", given.time, self._hz["diagnostics_hz"]):
+        if self._told.due(given.time):
             self._diagnose(given.time)
         if given.goal is not self._goal_told:
             self._goal_told = given.goal
             self._goal.publish(pose_message(given.goal, head))
-
-    def _cloud_due(self, time: float) -> bool:
-        """Once all arrays have told something new; where one does not, it is not waited for."""
-        new = [stamp > self._cloud_ns for stamp in self.source.scan_stamps_ns.values()]
-        hz = self._hz["cloud_hz"]
-        patient = time - self._shown["cloud_hz"] < PATIENCE / hz
-        if not any(new) or (patient and not all(new)):
-            return False
-        return self._turn("cloud_hz", time, hz)
-
-    def _turn(self, what: str, time: float, hz: float) -> bool:
-        """Is it time for this display again?"""
-        if time - self._shown[what] < EARLY / hz:
-            return False
-        self._shown[what] = time
-        return True
 
     def _diagnose(self, time: float) -> None:
         monitor = self.setup.scenario.controller.monitor
@@ -236,8 +217,9 @@ class ControllerNode(Node):
             setup = self._tuned(self.setup, tuning)
             self.law.retune(setup.make_tasks())
             self.setup = setup
-        for key in self._hz:
-            self._hz[key] = numbers.get(key, self._hz[key])
+        for key, pace in (("cloud_hz", self._clouds), ("diagnostics_hz", self._told)):
+            if key in numbers:
+                pace.set(numbers[key])
         rules = self._rules
         rules.position_tolerance = numbers.get("position_tolerance", rules.position_tolerance)
         rules.angle_tolerance = numbers.get("angle_tolerance", rules.angle_tolerance)

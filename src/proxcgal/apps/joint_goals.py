@@ -24,7 +24,7 @@ State = Literal["starting", "executing", "cancelling", "succeeded", "aborted", "
 
 BASE, END_EFFECTOR = FRAMES = ("kuka_base", "end_effector")
 AT_REST = 1e-3  # [rad/s] of every joint
-STOPPED_AFTER = 3.0  # [s] a cancelled goal has ended, whatever avoidance still moves
+STOPPED_AFTER = 3.0  # [s] a cancelled goal has ended, whatever still moves the arm
 KEPT_RESULTS = 1000  # the oldest are forgotten
 
 

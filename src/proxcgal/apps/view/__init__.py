@@ -68,6 +68,7 @@ def view_command(options: ViewOptions, command: str) -> int:
     page = LivePage(server, gate, scenario, options.controller or "wb")
     os.nice(5)  # the page yields to the simulation, which has its process by now
     try:
+        page.wait_for_scene()
         print(address(options.host, server.get_port(), token), flush=True)
         _attend(page)
     finally:

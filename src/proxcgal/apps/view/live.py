@@ -61,6 +61,7 @@ class LivePage:
         self._note, self._noted = "", 0.0
         self._plotted = 0.0
         self._waiting = True  # for the first stage: it takes no wishes before
+        self._staged = threading.Event()  # that came, or never will
         self._preparation = Preparation(scenario)
         self._closing = threading.Event()
         self.failure: str | None = None  #: why the simulation ended, where it did by itself
@@ -73,6 +74,16 @@ class LivePage:
         theirs.close()
         self._thread = threading.Thread(target=self._pump, daemon=True)
         self._thread.start()
+
+    def wait_for_scene(self) -> None:
+        """Until there is something to see.
+
+        Raises:
+            SimulationError: the simulation failed before that, with the reason.
+        """
+        self._staged.wait()
+        if self._drawing is None and self.failure is not None:
+            raise SimulationError(self.failure)
 
     def wait(self, timeout: float | None = None) -> bool:
         """Until the simulation has ended; true where it has.
@@ -101,6 +112,8 @@ class LivePage:
             self._exchange(self._link)
         except (EOFError, OSError):
             self.failure = self.failure or "the simulation's process has ended"
+        finally:
+            self._staged.set()
 
     def _exchange(self, link: Connection) -> None:
         spoken = 0.0
@@ -143,6 +156,7 @@ class LivePage:
                 self._shown = ()
             self.bounds = told.stage.d_min, told.stage.buffer
             self._controls.stage(told.stage, told.choice if told.refused else None)
+            self._staged.set()
         if told.moment is not None and self._drawing is not None:
             self.told = told
             self._draw(told, self._drawing)

@@ -68,7 +68,8 @@ class ReplayPage:
         whole_run(gui, recorded.moments, again.moments if again else None, recorded.stage)
 
         async def scrubbed(_: Any) -> None:
-            self.show(int(np.searchsorted(self._times, self._line.value - 1e-9)))
+            # The nearest: the line counts in hundredths of a second, and moments may lie between.
+            self.show(int(np.abs(self._times - self._line.value).argmin()))
 
         async def pressed(event: Any) -> None:
             self._press(event.target.value)
