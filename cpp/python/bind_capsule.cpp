@@ -4,14 +4,22 @@
 
 #include "convert.hpp"
 #include "proxcgal/geometry/capsule.hpp"
+#include "topics.hpp"
 
 namespace proxcgal::binding {
 namespace {
 
+/// No farther than points may be: squares would overflow, and a distance be wrong in silence.
+Vector3 place_from(nb::handle value, const char* name) {
+  const Vector3 place = vector3_from(value, name);
+  if (place.cwiseAbs().maxCoeff() <= kFarthest) return place;
+  throw GeometryError(std::string(name) + " is farther than 1e9 m from the origin");
+}
+
 Capsule make_capsule(nb::handle start, nb::handle end, double radius) {
-  if (!(std::isfinite(radius) && radius >= 0.0))
-    throw GeometryError("radius is " + std::to_string(radius) + ", must be finite and 0 m or more");
-  return {vector3_from(start, "start"), vector3_from(end, "end"), radius};
+  if (!(radius >= 0.0 && radius <= kFarthest))
+    throw GeometryError("radius is " + std::to_string(radius) + ", must be 0 to 1e9 m");
+  return {place_from(start, "start"), place_from(end, "end"), radius};
 }
 
 /// (n, 7) rows of start, end, radius.
@@ -22,10 +30,11 @@ std::vector<Capsule> capsules_from(nb::handle value, const char* name) {
   for (std::size_t i = 0; i < capsules.size(); ++i) {
     const double* row = view.data() + 7 * i;
     capsules[i] = {Vector3(row), Vector3(row + 3), row[6]};
-    if (!(capsules[i].start.allFinite() && capsules[i].end.allFinite() && row[6] >= 0.0 &&
-          std::isfinite(row[6])))
+    // maxCoeff of a NaN is anything: finiteness by itself.
+    const Eigen::Map<const Eigen::Matrix<double, 7, 1>> numbers(row);
+    if (!(numbers.allFinite() && numbers.cwiseAbs().maxCoeff() <= kFarthest && row[6] >= 0.0))
       throw GeometryError(std::string(name) + " row " + std::to_string(i) +
-                          " must be finite, its radius 0 m or more");
+                          " must be finite and at most 1e9 m, its radius 0 m or more");
   }
   return capsules;
 }
@@ -42,11 +51,8 @@ nb::ndarray<nb::numpy, double> distances(nb::handle a, nb::handle b) {
 }
 
 }  // namespace
-}  // namespace proxcgal::binding
 
-void bind_capsule(nanobind::module_& m) {
-  using namespace proxcgal;           // NOLINT(google-build-using-namespace)
-  using namespace proxcgal::binding;  // NOLINT(google-build-using-namespace)
+void bind_capsule(nb::module_& m) {
   nb::class_<Capsule>(m, "Capsule",
                       "All that lies within a radius of a segment. Source: [WT] Fig. 1.")
       .def(
@@ -98,3 +104,5 @@ void bind_capsule(nanobind::module_& m) {
       "point"_a, "velocity"_a, "to"_a,
       "Velocity of a point towards a capsule's axis [m/s], positive towards. Source: [WT] 2.2.");
 }
+
+}  // namespace proxcgal::binding

@@ -1,6 +1,7 @@
 #include "proxcgal/pipeline/command.hpp"
 #include "proxcgal/pipeline/solve.hpp"
 #include "stack_arguments.hpp"
+#include "topics.hpp"
 
 namespace proxcgal::binding {
 namespace {
@@ -8,19 +9,14 @@ namespace {
 Admissible make_admissible(nb::handle q_min, nb::handle q_max, nb::handle qd_max,
                            nb::handle qdd_max, nb::handle q, nb::handle qd, double dt,
                            double speed_scale) {
-  const JointVector posture = vector_from(q, "q", -1, Take::kConvert);
+  const JointVector posture = joints_from(q, "q");
   const Eigen::Index n = posture.size();
   const Limits limits{limits_from(q_min, "q_min", n, -kInfinity, ""),
                       limits_from(q_max, "q_max", n, -kInfinity, ""),
                       limits_from(qd_max, "qd_max", n, 0.0, "at least 0"),
                       limits_from(qdd_max, "qdd_max", n, 0.0, "at least 0")};
-  if (!(std::isfinite(dt) && dt > 0.0)) {
-    throw ConfigError("dt is " + std::to_string(dt) + ", must be finite and above 0 s");
-  }
-  if (!(speed_scale >= 0.0 && speed_scale <= 1.0)) {
-    throw ConfigError("speed_scale is " + std::to_string(speed_scale) +
-                      ", must be between 0 and 1");
-  }
+  require(std::isfinite(dt) && dt > 0.0, "dt", dt, "finite and above 0 s");
+  require(speed_scale >= 0.0 && speed_scale <= 1.0, "speed_scale", speed_scale, "between 0 and 1");
   return admissible(limits, posture, vector_from(qd, "qd", n, Take::kConvert), dt, speed_scale);
 }
 
@@ -52,12 +48,8 @@ Eigen::VectorXd rate_kept(nb::handle row, double least, const Admissible& box, n
 }
 
 }  // namespace
-}  // namespace proxcgal::binding
 
-void bind_command(nanobind::module_& m) {
-  using namespace proxcgal;           // NOLINT(google-build-using-namespace)
-  using namespace proxcgal::binding;  // NOLINT(google-build-using-namespace)
-
+void bind_command(nb::module_& m) {
   nb::class_<Admissible>(m, "Admissible",
                          "Velocities that each joint may take in one tick [rad/s] or [m/s].")
       .def_prop_ro(
@@ -86,3 +78,5 @@ void bind_command(nanobind::module_& m) {
         "The velocity in box nearest to qd with row @ qd >= least, (n,); where there is none, the "
         "one with the most.");
 }
+
+}  // namespace proxcgal::binding

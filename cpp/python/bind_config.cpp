@@ -3,6 +3,7 @@
 #include "convert.hpp"
 #include "named_pair.hpp"
 #include "proxcgal/controller.hpp"
+#include "topics.hpp"
 
 namespace proxcgal::binding {
 namespace {
@@ -13,12 +14,8 @@ constexpr std::pair<const char*, Confirmation> kConfirmations[] = {
     {"off", Confirmation::kOff}, {"zones", Confirmation::kZones}, {"scans", Confirmation::kScans}};
 
 }  // namespace
-}  // namespace proxcgal::binding
 
-void bind_config(nanobind::module_& m) {
-  using namespace proxcgal;           // NOLINT(google-build-using-namespace)
-  using namespace proxcgal::binding;  // NOLINT(google-build-using-namespace)
-
+void bind_config(nb::module_& m) {
   nb::class_<FilterConfig>(
       m, "FilterConfig",
       "How the robot's own body is told from obstacles ([WA] Algorithm 1, and what noise adds).")
@@ -176,22 +173,25 @@ void bind_config(nanobind::module_& m) {
           "control_point",
           [](const ControllerConfig& c) { return choice_name(c.control_point, kControlPoints); },
           "'whole_body', or 'sensor' (SM).")
-      .def_ro("tasks", &ControllerConfig::tasks)
-      .def_ro("filter", &ControllerConfig::filter)
-      .def_ro("solver", &ControllerConfig::solver)
-      .def_ro("monitor", &ControllerConfig::monitor)
+      .def_ro("tasks", &ControllerConfig::tasks, "The most important first.")
+      .def_ro("filter", &ControllerConfig::filter, "How the body is told from obstacles.")
+      .def_ro("solver", &ControllerConfig::solver, "Constants of the pseudo-inverse.")
+      .def_ro("monitor", &ControllerConfig::monitor, "Bounds of the monitor.")
       .def_ro("period", &ControllerConfig::period, "[s] nominal time from tick to tick.")
       .def_ro("min_row_norm", &ControllerConfig::min_row_norm,
               "A link whose row n'J is smaller is passed over.")
       .def_ro("avoid_links", &ControllerConfig::avoid_links,
               "Links that avoidance looks at; empty for all that some joint moves.")
-      .def_prop_ro("method",
-                   [](const ControllerConfig& c) { return choice_name(c.method, kMethods); })
+      .def_prop_ro(
+          "method", [](const ControllerConfig& c) { return choice_name(c.method, kMethods); },
+          "'fast', or 'paper' for the literal algorithms.")
       .def_ro("max_points", &ControllerConfig::max_points,
               "The most known points that a tick takes.")
-      .def_ro("timings", &ControllerConfig::timings)
+      .def_ro("timings", &ControllerConfig::timings, "Whether a tick tells what each stage took.")
       .def_ro("memory", &ControllerConfig::memory,
               "Of what left the sensors' view; None: as in the paper.")
       .def_ro("motion", &ControllerConfig::motion,
               "x_o of eq. (4) from the scans; None: taken for zero.");
 }
+
+}  // namespace proxcgal::binding

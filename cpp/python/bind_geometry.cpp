@@ -4,6 +4,7 @@
 
 #include "convert.hpp"
 #include "proxcgal/geometry/mesh_tree.hpp"
+#include "topics.hpp"
 
 namespace proxcgal::binding {
 namespace {
@@ -59,23 +60,18 @@ Eigen::VectorXd winding_number(const MeshTree& tree, nb::handle points) {
 }
 
 auto distance(const MeshTree& tree, const MeshTree& other, nb::handle T_LO, double bound) {
-  Vector3 here = Vector3::Constant(std::nan("")), there = here;
+  require_bound(bound);
   const Pose pose = pose_from(T_LO, "T_LO");
-  Vector3 a, b;
-  const double d = tree.distance(other, pose, bound, &a, &b);
-  if (std::isfinite(d)) {
-    here = a;
-    there = b;
-  }
+  Vector3 here, there;
+  const nb::gil_scoped_release release;
+  const double d = tree.distance(other, pose, bound, &here, &there);
+  if (!std::isfinite(d)) here = there = Vector3::Constant(std::nan(""));
   return std::make_tuple(d, here, there);
 }
 
 }  // namespace
-}  // namespace proxcgal::binding
 
-void bind_geometry(nanobind::module_& m) {
-  using namespace proxcgal;           // NOLINT(google-build-using-namespace)
-  using namespace proxcgal::binding;  // NOLINT(google-build-using-namespace)
+void bind_geometry(nb::module_& m) {
   nb::class_<MeshTree>(m, "MeshTree",
                        "Surface of one rigid link: indexed once, queried often. All of it is in "
                        "the link frame L.\n\n"
@@ -110,3 +106,5 @@ void bind_geometry(nanobind::module_& m) {
            "point on the other in its frame). 0 where they cross; inf and NaN points where it is "
            "not below `bound`.");
 }
+
+}  // namespace proxcgal::binding

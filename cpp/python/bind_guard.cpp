@@ -4,6 +4,7 @@
 
 #include "proxcgal/safety/guard.hpp"
 #include "robot_arguments.hpp"
+#include "topics.hpp"
 
 namespace proxcgal::binding {
 namespace {
@@ -13,9 +14,11 @@ using Pairs = std::vector<std::pair<std::string, std::string>>;
 constexpr std::pair<const char*, TorqueState> kStates[] = {
     {"off", TorqueState::kOff}, {"on", TorqueState::kOn}, {"stopping", TorqueState::kStopping}};
 
-JointVector joints_or_none(nb::handle value, const char* name) {
-  if (value.is_none()) return {};
-  return vector_from(value, name, -1, Take::kConvert);
+double separation_needed(const IsoSeparation& iso, double robot_speed, double stop_time) {
+  const auto usable = [](double value) { return std::isfinite(value) && value >= 0.0; };
+  require(usable(robot_speed), "robot_speed", robot_speed, "finite, 0 m/s or more");
+  require(usable(stop_time), "stop_time", stop_time, "finite, 0 s or more");
+  return protective_distance(iso, robot_speed, stop_time);
 }
 
 Pairs pairs_of(const std::vector<Contradiction>& found) {
@@ -43,11 +46,8 @@ const GuardOutput& cycle(Guard& guard, double time, nb::handle q, nb::handle qd,
 }
 
 }  // namespace
-}  // namespace proxcgal::binding
 
-void bind_guard(nanobind::module_& m) {
-  using namespace proxcgal;           // NOLINT(google-build-using-namespace)
-  using namespace proxcgal::binding;  // NOLINT(google-build-using-namespace)
+void bind_guard(nb::module_& m) {
   nb::class_<LinkCapsule>(m, "LinkCapsule", "The capsule of one link, in the link's frame.")
       .def(
           "__init__",
@@ -56,17 +56,19 @@ void bind_guard(nanobind::module_& m) {
           },
           "name"_a, "link"_a, "shape_L"_a,
           "Args: name, for messages and lists; link, a row of link_names; shape_L.")
-      .def_ro("name", &LinkCapsule::name)
+      .def_ro("name", &LinkCapsule::name, "For messages and lists.")
       .def_ro("link", &LinkCapsule::link, "Row of link_names.")
-      .def_ro("shape_L", &LinkCapsule::shape_L);
+      .def_ro("shape_L", &LinkCapsule::shape_L, "In the link's frame.");
   nb::class_<IsoSeparation>(m, "IsoSeparation",
                             "What the separation distance of ISO/TS 15066 is computed with.")
       .def(
           "__init__",
           [](IsoSeparation* self, double human_speed, double reaction_time, double intrusion,
              double human_uncertainty, double robot_uncertainty) {
-            new (self) IsoSeparation{human_speed, reaction_time, intrusion, human_uncertainty,
-                                     robot_uncertainty};
+            const IsoSeparation iso{human_speed, reaction_time, intrusion, human_uncertainty,
+                                    robot_uncertainty};
+            iso.validate();
+            new (self) IsoSeparation(iso);
           },
           nb::kw_only(), "human_speed"_a = IsoSeparation{}.human_speed,
           "reaction_time"_a = IsoSeparation{}.reaction_time,
@@ -78,7 +80,7 @@ void bind_guard(nanobind::module_& m) {
       .def_ro("intrusion", &IsoSeparation::intrusion, "C [m]")
       .def_ro("human_uncertainty", &IsoSeparation::human_uncertainty, "Z_d [m]")
       .def_ro("robot_uncertainty", &IsoSeparation::robot_uncertainty, "Z_r [m]");
-  m.def("protective_distance", &protective_distance, "iso"_a, "robot_speed"_a, "stop_time"_a,
+  m.def("protective_distance", &separation_needed, "iso"_a, "robot_speed"_a, "stop_time"_a,
         "Separation distance of ISO/TS 15066 [m] for constant speeds [m/s] and constant "
         "deceleration over the stopping time [s].");
   nb::class_<GuardConfig>(m, "GuardConfig",
@@ -94,13 +96,15 @@ void bind_guard(nanobind::module_& m) {
              const IsoSeparation& iso, std::vector<std::string> accept) {
             GuardConfig config;
             config.capsules = std::move(capsules);
-            config.q_reference = joints_or_none(q_reference, "q_reference");
+            config.q_reference = joints_from(q_reference, "q_reference");
             config.tcp_speed = tcp_speed;
-            config.qd_max = joints_or_none(qd_max, "qd_max");
-            config.qdd_max = joints_or_none(qdd_max, "qdd_max");
+            config.qd_max = joints_from(qd_max, "qd_max");
+            config.qdd_max = joints_from(qdd_max, "qdd_max");
             config.timing = {stop_time, rest_speed, period, max_gap};
             config.separation = {
-                {human_radius, human_height, vector3_from(human_offset, "human_offset")},
+                {human_radius, human_height,
+                 human_offset.is_none() ? OperatorCapsule{}.offset_T
+                                        : vector3_from(human_offset, "human_offset")},
                 std::move(pairs),
                 std::move(ends),
                 min_distance,
@@ -119,7 +123,14 @@ void bind_guard(nanobind::module_& m) {
           "pairs"_a = std::vector<std::string>{}, "ends"_a = std::vector<std::string>{},
           "human_radius"_a = OperatorCapsule{}.radius, "human_height"_a = OperatorCapsule{}.height,
           "human_offset"_a = nb::none(), "subtract_human"_a = false, "iso"_a = IsoSeparation{},
-          "accept"_a = std::vector<std::string>{})
+          "accept"_a = std::vector<std::string>{},
+          "Args: capsules, at least one; q_reference (n,) [rad] of eqs. (1) and (2); tcp_speed "
+          "[m/s]; qd_max [rad/s], qdd_max [rad/s^2] (n,), None for those of the equations; "
+          "stop_time, period, max_gap [s]; rest_speed [rad/s]; min_distance [m]; max_velocity "
+          "[m/s]; pairs, ends: names of capsules, empty for all; human_radius, human_height [m] "
+          "and human_offset (3,) [m] of the operator's capsule, its middle in the tool's frame; "
+          "accept, as `guard_contradictions` names them.\n"
+          "Raises: GeometryError for a wrong shape or what is not finite; `Guard` checks the rest.")
       .def_ro("tcp_speed", &GuardConfig::tcp_speed, "[m/s] xd_UB")
       .def_ro("accept", &GuardConfig::accept, "Contradictions taken as they are, item by item.")
       .def_prop_ro(
@@ -200,7 +211,7 @@ void bind_guard(nanobind::module_& m) {
       .def_prop_ro(
           "qdd_bounds", [](const Guard& g) { return Eigen::VectorXd(g.limits().qdd); },
           "(n,) [rad/s^2] of eq. (2).")
-      .def_prop_ro("config", &Guard::config)
+      .def_prop_ro("config", &Guard::config, "That it was set up with.")
       .def_prop_ro(
           "accepted", [](const Guard& g) { return pairs_of(g.accepted()); },
           "Contradictions that are taken as they are: to be printed and logged.")
@@ -225,3 +236,5 @@ void bind_guard(nanobind::module_& m) {
       .def_prop_ro("protective_distance", &Guard::protective_distance,
                    "[m] ISO/TS 15066 at tcp_speed, beside min_distance.");
 }
+
+}  // namespace proxcgal::binding

@@ -1,5 +1,6 @@
 #include "proxcgal/hand_guide.hpp"
 #include "robot_arguments.hpp"
+#include "topics.hpp"
 
 namespace proxcgal::binding {
 namespace {
@@ -8,17 +9,9 @@ Vector6 vector6_from(nb::handle value, const char* name, Take take = Take::kConv
   return vector_from(value, name, 6, take, false);
 }
 
-JointVector joints_or_none(nb::handle value, const char* name) {
-  if (value.is_none()) return {};
-  return vector_from(value, name, -1, Take::kConvert, false);
-}
-
 }  // namespace
-}  // namespace proxcgal::binding
 
-void bind_guiding(nanobind::module_& m) {
-  using namespace proxcgal;           // NOLINT(google-build-using-namespace)
-  using namespace proxcgal::binding;  // NOLINT(google-build-using-namespace)
+void bind_guiding(nb::module_& m) {
   const AdmittanceConfig fresh;
   nb::class_<AdmittanceConfig>(m, "AdmittanceConfig",
                                "M a + D v = F: three linear and three angular axes, in world.")
@@ -61,6 +54,7 @@ void bind_guiding(nanobind::module_& m) {
       .def(
           "step",
           [](Admittance& a, nb::handle force, bool engaged, double dt) {
+            require(std::isfinite(dt) && dt > 0.0, "dt", dt, "finite and above 0 s");
             return Vector6(a.step(vector6_from(force, "force"), engaged, dt));
           },
           "force"_a, "engaged"_a, "dt"_a,
@@ -96,9 +90,9 @@ void bind_guiding(nanobind::module_& m) {
           [](HandGuide* self, std::shared_ptr<const Robot> robot,
              const AdmittanceConfig& admittance, const SolverConfig& solver, nb::handle qd_max,
              nb::handle qdd_max, double period) {
-            new (self)
-                HandGuide(std::move(robot), {admittance, solver, joints_or_none(qd_max, "qd_max"),
-                                             joints_or_none(qdd_max, "qdd_max"), period});
+            new (self) HandGuide(std::move(robot),
+                                 {admittance, solver, joints_from(qd_max, "qd_max", false),
+                                  joints_from(qdd_max, "qdd_max", false), period});
           },
           "robot"_a, nb::kw_only(), "admittance"_a = fresh, "solver"_a = SolverConfig{},
           "qd_max"_a = nb::none(), "qdd_max"_a = nb::none(), "period"_a = HandGuideConfig{}.period,
@@ -115,3 +109,5 @@ void bind_guiding(nanobind::module_& m) {
           "engaged, the hand's switch.\nReturns: the output, reused: copy what you keep.")
       .def("halt", &HandGuide::halt, "The torque was cut: what follows starts at rest.");
 }
+
+}  // namespace proxcgal::binding

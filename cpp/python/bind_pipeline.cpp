@@ -1,6 +1,5 @@
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
-#include <nanobind/stl/tuple.h>
 
 #include <algorithm>
 #include <limits>
@@ -10,14 +9,11 @@
 #include "named_pair.hpp"
 #include "proxcgal/pipeline/distance.hpp"
 #include "proxcgal/pipeline/filter.hpp"
-#include "proxcgal/pipeline/sense.hpp"
 #include "robot_arguments.hpp"
+#include "topics.hpp"
 
 namespace proxcgal::binding {
 namespace {
-
-constexpr std::pair<const char*, RangeModel> kRangeModels[] = {{"tangent", RangeModel::kTangent},
-                                                               {"printed", RangeModel::kPrinted}};
 
 void require_rows(const Eigen::Map<const Points>& points, const char* name) {
   if (points.rows() == 0)
@@ -34,13 +30,12 @@ nb::object remove_body_all(const Robot& robot, nb::handle q, nb::handle origins,
                         ": one origin for each point is needed");
   }
   double same = 0.0;
-  const Eigen::VectorXd per_point = nb::try_cast(tolerance, same)
-                                        ? Eigen::VectorXd::Constant(n, same)
-                                        : vector_from(tolerance, "tolerance", n, Take::kConvert);
-  if (!per_point.allFinite() || !((per_point.array() >= 0.0).all()))
-    throw ConfigError("tolerance must be finite, 0 m or more");
-  if (!(min_hit >= 0.0))
-    throw ConfigError("min_hit is " + std::to_string(min_hit) + ", allowed is 0 m or more");
+  const Eigen::VectorXd per_point =
+      nb::try_cast(tolerance, same) ? Eigen::VectorXd::Constant(n, same)
+                                    : vector_from(tolerance, "tolerance", n, Take::kConvert, false);
+  for (const double value : per_point)
+    require(std::isfinite(value) && value >= 0.0, "tolerance", value, "finite, 0 m or more");
+  require(std::isfinite(min_hit) && min_hit >= 0.0, "min_hit", min_hit, "finite, 0 m or more");
   const Method how = choice(method, "method", kMethods);
   const Posture posture = posture_at(robot, q);
   auto* keep = new bool[static_cast<std::size_t>(n)];
@@ -63,6 +58,7 @@ NamedPair closest_pair_all(const Robot& robot, nb::handle q, nb::handle points,
   require_rows(points_W(), "points_W");
   const Method how = choice(method, "method", kMethods);
   const Posture posture = posture_at(robot, q);
+  if (steps) require(*steps >= 0, "steps", *steps, "0 or more, or None");
   const nb::gil_scoped_release release;
   std::int64_t left = steps.value_or(kAnySteps);
   return named(robot, closest_pair(robot, posture, points_W(), how, {.steps = &left}));
@@ -108,6 +104,7 @@ SignedDistances signed_distances(const Robot& robot, nb::handle q, nb::handle po
 /// Robot links against a surface that is not the robot's: the exact distance of meshes.
 NamedPair mesh_distance(const Robot& robot, nb::handle q, const MeshTree& tree, nb::handle T_WO,
                         const std::optional<std::vector<std::string>>& links, double bound) {
+  require_bound(bound);
   const Posture posture = posture_at(robot, q);
   const Pose pose = T_WO.is_none() ? Pose::Identity() : pose_from(T_WO, "T_WO");
   std::vector<int> rows;
@@ -136,6 +133,7 @@ NamedPair mesh_distance(const Robot& robot, nb::handle q, const MeshTree& tree, 
 
 Eigen::VectorXd self_distances(const Robot& robot, nb::handle q,
                                const std::vector<std::pair<int, int>>& pairs, double bound) {
+  require_bound(bound);
   const Posture posture = posture_at(robot, q);
   for (const auto& [a, b] : pairs) {
     if (std::min(a, b) < 0 || std::max(a, b) >= robot.n_links()) {
@@ -155,123 +153,9 @@ Eigen::VectorXd self_distances(const Robot& robot, nb::handle q,
   return out;
 }
 
-Points zone_directions(const SensorModel& model) {
-  const Sense sense(model);
-  Points directions(kZones, 3);
-  for (int zone = 0; zone < kZones; ++zone)
-    directions.row(zone) = sense.point(zone, 1.0).transpose();
-  return directions;
-}
-
-/// What one packet says, zone by zone: (zones, points, ranges, standard deviations).
-std::tuple<Eigen::VectorXi, Points, Eigen::VectorXd, Eigen::VectorXd> sense(
-    const SensorModel& model, const Scan& scan) {
-  SensedPoints sensed;
-  Sense{model}(scan, sensed);
-  Eigen::VectorXi zones(sensed.count);
-  Points points_S(sensed.count, 3);
-  Eigen::VectorXd ranges(sensed.count), sigmas(sensed.count);
-  for (int i = 0; i < sensed.count; ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    zones[i] = sensed.zone[at];
-    points_S.row(i) = sensed.point_S[at].transpose();
-    ranges[i] = sensed.range[at];
-    sigmas[i] = sensed.sigma[at];
-  }
-  return {zones, points_S, ranges, sigmas};
-}
-
-Skin joined(const Skin& a, const Skin& b) {
-  if (!(a.model == b.model))
-    throw ConfigError(
-        "skins with different sensor models cannot be joined: give both the same model");
-  Skin skin = a;
-  skin.mounts.insert(skin.mounts.end(), b.mounts.begin(), b.mounts.end());
-  return skin;
-}
-
-void bind_skin(nb::module_& m) {
-  nb::class_<SensorModel>(
-      m, "SensorModel",
-      "Model of one VL53L8CX-like sensor: 8 x 8 zones, distance along its z axis. SI units.")
-      .def(
-          "__init__",
-          [](SensorModel* self, double field_of_view, double min_range, double max_range,
-             double workspace, double sigma_floor, double sigma_ratio,
-             const std::string& range_model) {
-            const SensorModel model{field_of_view,
-                                    min_range,
-                                    max_range,
-                                    workspace,
-                                    sigma_floor,
-                                    sigma_ratio,
-                                    choice(range_model, "range_model", kRangeModels)};
-            model.validate();
-            new (self) SensorModel(model);
-          },
-          nb::kw_only(), "field_of_view"_a = SensorModel{}.field_of_view,
-          "min_range"_a = SensorModel{}.min_range, "max_range"_a = SensorModel{}.max_range,
-          "workspace"_a = SensorModel{}.workspace, "sigma_floor"_a = SensorModel{}.sigma_floor,
-          "sigma_ratio"_a = SensorModel{}.sigma_ratio, "range_model"_a = "tangent")
-      .def_ro("field_of_view", &SensorModel::field_of_view, "[rad] along one side.")
-      .def_ro("min_range", &SensorModel::min_range, "[m].")
-      .def_ro("max_range", &SensorModel::max_range, "[m].")
-      .def_ro("workspace", &SensorModel::workspace,
-              "[m] along the ray; farther points are cropped.")
-      .def_ro("sigma_floor", &SensorModel::sigma_floor, "[m] least standard deviation of a range.")
-      .def_ro("sigma_ratio", &SensorModel::sigma_ratio, "[-] of the range, where that is more.")
-      .def_prop_ro(
-          "range_model",
-          [](const SensorModel& s) { return choice_name(s.range_model, kRangeModels); },
-          "'tangent', or 'printed' as [WA] eq. (1) has it.")
-      .def("sigma", &SensorModel::sigma, "range"_a, "Standard deviation of a range [m].")
-      .def(
-          "__eq__",
-          [](const SensorModel& self, const nb::object& other) {
-            SensorModel model;
-            return nb::try_cast(other, model) && self == model;
-          },
-          nb::sig("def __eq__(self, other: object, /) -> bool"));
-  m.def("zone_directions", &zone_directions, "model"_a,
-        "(64, 3) point of each zone at range 1 m, in the sensor's frame: [WA] eq. (1). Zone = 8 "
-        "row + column.");
-  m.def(
-      "sense", &sense, "model"_a, "scan"_a,
-      "The sense stage alone, of the zones with a target inside the workspace: zones (n,), points "
-      "(n, 3) in the sensor's frame, ranges (n,) along the rays and their standard deviations "
-      "(n,) [m].");
-  nb::class_<Mount>(m, "Mount", "Where one sensor sits: its frame in the link's, z looking out.")
-      .def(
-          "__init__",
-          [](Mount* self, std::string name, std::string link, nb::handle T_LS) {
-            new (self) Mount{std::move(name), std::move(link), pose_from(T_LS, "T_LS")};
-          },
-          "name"_a, "link"_a, "T_LS"_a)
-      .def_ro("name", &Mount::name)
-      .def_ro("link", &Mount::link)
-      .def_prop_ro(
-          "T_LS", [](const Mount& mount) { return to_matrix(mount.T_LS); }, "(4, 4).");
-  nb::class_<Skin>(
-      m, "Skin", "The sensors of a robot, row by row, and the model they share. Skins join with +.")
-      .def(
-          "__init__",
-          [](Skin* self, std::vector<Mount> mounts, const SensorModel& model) {
-            new (self) Skin{std::move(mounts), model};
-          },
-          "mounts"_a, "model"_a = SensorModel{})
-      .def_prop_ro("mounts", [](const Skin& skin) { return skin.mounts; })
-      .def_prop_ro("model", [](const Skin& skin) { return skin.model; })
-      .def("__len__", [](const Skin& skin) { return skin.mounts.size(); })
-      .def("__add__", &joined, "other"_a);
-}
-
 }  // namespace
-}  // namespace proxcgal::binding
 
-void bind_pipeline(nanobind::module_& m) {
-  using namespace proxcgal;           // NOLINT(google-build-using-namespace)
-  using namespace proxcgal::binding;  // NOLINT(google-build-using-namespace)
-  bind_skin(m);
+void bind_pipeline(nb::module_& m) {
   nb::class_<NamedPair>(m, "ClosestPair",
                         "The nearest obstacle point and the robot surface point nearest to it.")
       .def_prop_ro(
@@ -314,7 +198,9 @@ void bind_pipeline(nanobind::module_& m) {
         "        distance is a lower bound, and marked so. None: as many as it takes.\n\n"
         "Raises:\n    GeometryError: empty cloud, wrong shape, or not finite.");
   m.def("closest_pairs", &closest_pairs_all, "robot"_a, "q"_a, "points_W"_a,
-        "The nearest pair of each link, in the order of link_names.");
+        "The nearest pair of each link, in the order of link_names.\n\n"
+        "Args: q (n_q,); points_W (n, 3) [m].\n"
+        "Raises: GeometryError for an empty cloud, a wrong shape, or what is not finite.");
   nb::class_<SignedDistances>(m, "SignedDistances",
                               "Distances with a sign, row by row of the points asked for.")
       .def_ro("distance", &SignedDistances::distance, "(n,) [m], negative inside a link.")
@@ -337,8 +223,17 @@ void bind_pipeline(nanobind::module_& m) {
         "links"_a = nb::none(), "bound"_a = kInfinity,
         "Exact distance from the robot's meshes to another surface whose frame has pose T_WO in "
         "world. 0 where they cross;\n"
-        "distance inf and link '' where nothing is nearer than `bound`. `point` is -1.");
+        "distance inf and link '' where nothing is nearer than `bound`. `point` is -1.\n\n"
+        "Args: q (n_q,); tree, in its own frame; T_WO (4, 4), None for the world's; links, by "
+        "name, None for all; bound [m].\n"
+        "Raises: GeometryError for a wrong shape or no pose, ModelError for a link that is not "
+        "there, ConfigError for a bound that is negative or NaN.");
   m.def("self_distances", &self_distances, "robot"_a, "q"_a, "pairs"_a, "bound"_a = kInfinity,
-        "Exact distance [m] between the meshes of each pair of link rows; inf where it is not "
-        "below `bound`.");
+        "Exact distance [m] between the meshes of each pair of link rows, (len(pairs),); inf where "
+        "it is not below `bound`.\n\n"
+        "Args: q (n_q,); pairs of rows of link_names; bound [m].\n"
+        "Raises: GeometryError for a row that is not there or a wrong q, ConfigError for a bound "
+        "that is negative or NaN.");
 }
+
+}  // namespace proxcgal::binding

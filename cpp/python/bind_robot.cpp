@@ -5,6 +5,7 @@
 
 #include "proxcgal/robot.hpp"
 #include "robot_arguments.hpp"
+#include "topics.hpp"
 
 namespace proxcgal::binding {
 namespace {
@@ -28,11 +29,8 @@ Eigen::MatrixXd jacobian(const Robot& robot, nb::handle q, const nb::object& lin
 }
 
 }  // namespace
-}  // namespace proxcgal::binding
 
-void bind_robot(nanobind::module_& m) {
-  using namespace proxcgal;           // NOLINT(google-build-using-namespace)
-  using namespace proxcgal::binding;  // NOLINT(google-build-using-namespace)
+void bind_robot(nb::module_& m) {
   nb::class_<JointSpec>(m, "JointSpec",
                         "One moving joint; fixed joints are folded into `origin`, the joint frame "
                         "at q = 0 in its parent's.")
@@ -53,8 +51,12 @@ void bind_robot(nanobind::module_& m) {
           },
           "name"_a, nb::kw_only(), "type"_a = "revolute", "parent"_a = -1, "origin"_a, "axis"_a,
           "q_min"_a = -kInfinity, "q_max"_a = kInfinity, "qd_max"_a = kInfinity,
-          "qdd_max"_a = kInfinity)
-      .def_ro("name", &JointSpec::name);
+          "qdd_max"_a = kInfinity,
+          "Args: name; type, 'revolute' or 'prismatic'; parent, row of the joint it hangs on, -1 "
+          "for the base; origin (4, 4) [m]; axis (3,) unit, in the joint's frame; q_min, q_max "
+          "[rad] or [m]; qd_max, qdd_max a second and a second squared.\n"
+          "Raises: GeometryError for a wrong shape or no pose, ConfigError for another type.")
+      .def_ro("name", &JointSpec::name, "Of the joint.");
   nb::class_<LinkSpec>(m, "LinkSpec",
                        "One rigid link with its mesh in the link frame; `T_JL` is that frame's "
                        "pose in the joint that moves it (-1: the base).")
@@ -67,8 +69,11 @@ void bind_robot(nanobind::module_& m) {
                                 pose_from(T_JL, "T_JL"),   vertices_L(),
                                 triangles_from(triangles), mesh_error};
           },
-          "name"_a, "joint"_a, "T_JL"_a, "vertices_L"_a, "triangles"_a, "mesh_error"_a = 0.0)
-      .def_ro("name", &LinkSpec::name);
+          "name"_a, "joint"_a, "T_JL"_a, "vertices_L"_a, "triangles"_a, "mesh_error"_a = 0.0,
+          "Args: name; joint, row of the one that moves it; T_JL (4, 4) [m]; vertices_L (v, 3) "
+          "[m]; triangles (f, 3) vertex rows; mesh_error [m] to the real surface at most.\n"
+          "Raises: GeometryError for a wrong shape, no pose, or what is not finite.")
+      .def_ro("name", &LinkSpec::name, "Of the link.");
   nb::class_<Robot>(m, "Robot",
                     "Poses and Jacobians of every link, and the links' surfaces. The base stands "
                     "at the world's origin.")
@@ -79,10 +84,16 @@ void bind_robot(nanobind::module_& m) {
             new (self) Robot(RobotSpec{std::move(name), std::move(joints), std::move(links),
                                        std::move(tool), tool_joint, pose_from(T_JT, "T_JT")});
           },
-          "name"_a, "joints"_a, "links"_a, "tool"_a, "tool_joint"_a, "T_JT"_a)
-      .def_prop_ro("name", [](const Robot& r) { return r.spec().name; })
+          "name"_a, "joints"_a, "links"_a, "tool"_a, "tool_joint"_a, "T_JT"_a,
+          "Args: name; joints, parents before children; links, base first; tool, the frame's "
+          "name; tool_joint, row of the joint that moves it; T_JT (4, 4), its pose in it [m].\n"
+          "Raises: ModelError for a tree or limits that are none, GeometryError for a mesh.")
+      .def_prop_ro(
+          "name", [](const Robot& r) { return r.spec().name; }, "Of the robot.")
       .def_prop_ro("n_q", &Robot::n_q, "Number of moving joints.")
-      .def_prop_ro("joint_names", [](const Robot& r) { return names_of(r.spec().joints); })
+      .def_prop_ro(
+          "joint_names", [](const Robot& r) { return names_of(r.spec().joints); },
+          "In the order of q.")
       .def_prop_ro(
           "link_names", [](const Robot& r) { return names_of(r.spec().links); },
           "Links that carry a mesh, base first.")
@@ -147,3 +158,5 @@ void bind_robot(nanobind::module_& m) {
           },
           "joint"_a, "link"_a, "Does the joint move the link?");
 }
+
+}  // namespace proxcgal::binding

@@ -1,5 +1,6 @@
 #include "proxcgal/pipeline/solve.hpp"
 #include "stack_arguments.hpp"
+#include "topics.hpp"
 
 namespace proxcgal::binding {
 namespace {
@@ -51,12 +52,8 @@ std::vector<Eigen::VectorXd> levels_of(const Solution& solution) {
 }
 
 }  // namespace
-}  // namespace proxcgal::binding
 
-void bind_solve(nanobind::module_& m) {
-  using namespace proxcgal;           // NOLINT(google-build-using-namespace)
-  using namespace proxcgal::binding;  // NOLINT(google-build-using-namespace)
-
+void bind_solve(nb::module_& m) {
   nb::class_<Task>(
       m, "Task",
       "One level of the stack: rates that its rows should have. Source: thesis eq. (4.8).")
@@ -114,3 +111,5 @@ void bind_solve(nanobind::module_& m) {
         "saturation.\nRaises: GeometryError for columns or qd_max that do not fit, ConfigError for "
         "no or too many tasks and a negative qd_max.\nSource: thesis eqs. (4.7), (4.8).");
 }
+
+}  // namespace proxcgal::binding

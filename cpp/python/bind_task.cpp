@@ -2,6 +2,7 @@
 
 #include "convert.hpp"
 #include "proxcgal/pipeline/task.hpp"
+#include "topics.hpp"
 
 namespace proxcgal::binding {
 namespace {
@@ -18,12 +19,8 @@ void construct(Spec* self, const Spec& spec) {
 }
 
 }  // namespace
-}  // namespace proxcgal::binding
 
-void bind_task(nanobind::module_& m) {
-  using namespace proxcgal;           // NOLINT(google-build-using-namespace)
-  using namespace proxcgal::binding;  // NOLINT(google-build-using-namespace)
-
+void bind_task(nb::module_& m) {
   const char* raises = "Raises: ConfigError with field, value and bound.";
   nb::class_<Avoidance>(
       m, "Avoidance",
@@ -120,3 +117,5 @@ void bind_task(nanobind::module_& m) {
         "Bell of [iCAT]: 1 for x <= a, 0 for x >= b, a cosine between.");
   m.def("increasing", &increasing, "x"_a, "a"_a, "b"_a, "1 - decreasing.");
 }
+
+}  // namespace proxcgal::binding

@@ -7,12 +7,14 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <cmath>
 #include <initializer_list>
 #include <string>
 #include <utility>
 
 #include "proxcgal/error.hpp"
 #include "proxcgal/types.hpp"
+#include "require.hpp"
 
 /// From what a user passes to what the core takes: shape, type and finiteness are told by name.
 namespace proxcgal::binding {
@@ -37,22 +39,34 @@ inline std::string shape_of(const ArrayView& array) {
   return text + (array.ndim() == 1 ? ",)" : ")");
 }
 
+/// What a user passed instead of an array that can be taken: of an array its type and layout.
+inline std::string kind_of(nb::handle value) {
+  const nb::object ndarray = nb::module_::import_("numpy").attr("ndarray");
+  if (!nb::isinstance(value, ndarray)) return text_of(value.type().attr("__name__"));
+  const bool contiguous = nb::cast<bool>(value.attr("flags").attr("c_contiguous"));
+  return std::string(contiguous ? "" : "a not C-contiguous ") + "array of type " +
+         text_of(value.attr("dtype"));
+}
+
 /// @throws GeometryError  naming the argument, what it is and what it must be
 inline ArrayView array_from(nb::handle value, const char* name, const std::string& expected,
                             Take take) {
   ArrayView view;
   if (nb::try_cast(value, view, false)) return view;
   const auto refuse = [&]() {
-    throw GeometryError(std::string(name) + " is " + text_of(value.type()) + ", expected " +
+    const char* layout = take == Take::kExact ? "C-contiguous " : "";
+    throw GeometryError(std::string(name) + " is " + kind_of(value) + ", expected " + layout +
                         expected);
   };
   if (take == Take::kExact) refuse();
   try {
     const nb::object numpy = nb::module_::import_("numpy");
-    const nb::object array = numpy.attr("ascontiguousarray")(value, "dtype"_a = "float64");
+    const nb::object given = numpy.attr("asarray")(value);
+    // Imaginary parts would be dropped with no more than a warning.
+    if (text_of(given.attr("dtype").attr("kind")) == "c") refuse();
     // ascontiguousarray makes a number an array of one row: that is no array that was passed.
-    if (nb::cast<int>(numpy.attr("ndim")(value)) > 0 && nb::try_cast(array, view, false))
-      return view;
+    const nb::object array = numpy.attr("ascontiguousarray")(given, "dtype"_a = "float64");
+    if (nb::cast<int>(given.attr("ndim")) > 0 && nb::try_cast(array, view, false)) return view;
   } catch (const nb::python_error&) {
     // told below, with the argument's name
   }
@@ -109,7 +123,13 @@ class PointsArgument {
 /// Face indices of any integer type; whether they exist is the mesh's own check.
 inline Triangles triangles_from(nb::handle value) {
   const nb::object numpy = nb::module_::import_("numpy");
-  const nb::object array = numpy.attr("asarray")(value);
+  nb::object array;
+  try {
+    array = numpy.attr("asarray")(value);
+  } catch (const nb::python_error&) {
+    throw GeometryError("triangles is " + kind_of(value) +
+                        " that is no array, expected integers of shape (f, 3)");
+  }
   const std::string kind = nb::cast<std::string>(array.attr("dtype").attr("kind"));
   if (kind != "i" && kind != "u") {
     throw GeometryError("triangles has type " + text_of(array.attr("dtype")) +
@@ -134,7 +154,7 @@ inline Triangles triangles_from(nb::handle value) {
   return triangles;
 }
 
-/// @param size  expected length, -1 for any up to `most`
+/// @param size  expected length, -1 for any
 inline Eigen::VectorXd vector_from(nb::handle value, const char* name, std::int64_t size, Take take,
                                    bool finite = true) {
   const std::string expected =
@@ -147,9 +167,23 @@ inline Eigen::VectorXd vector_from(nb::handle value, const char* name, std::int6
   return vector;
 }
 
+/// As many numbers as there may be joints at most: more do not fit into a JointVector.
+/// @param value  None for no number at all
+inline JointVector joints_from(nb::handle value, const char* name, bool finite = true) {
+  if (value.is_none()) return {};
+  const Eigen::VectorXd joints = vector_from(value, name, -1, Take::kConvert, finite);
+  if (joints.size() <= kMaxJoints) return joints;
+  throw GeometryError(std::string(name) + " has " + std::to_string(joints.size()) +
+                      " rows, one a joint: at most " + std::to_string(kMaxJoints) +
+                      " are supported");
+}
+
 inline Vector3 vector3_from(nb::handle value, const char* name, Take take = Take::kConvert) {
   return vector_from(value, name, 3, take);
 }
+
+/// What an argument `bound` may be: distances are looked for below it.
+inline void require_bound(double bound) { require(bound >= 0.0, "bound", bound, "0 m or more"); }
 
 /// @param rigid  refuse what is no rotation and translation
 inline Pose pose_from(nb::handle value, const char* name, Take take = Take::kConvert,

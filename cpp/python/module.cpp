@@ -1,20 +1,9 @@
 #include <nanobind/nanobind.h>
 
 #include "proxcgal/error.hpp"
+#include "topics.hpp"
 
 namespace nb = nanobind;
-
-void bind_geometry(nb::module_& m);
-void bind_capsule(nb::module_& m);
-void bind_robot(nb::module_& m);
-void bind_pipeline(nb::module_& m);
-void bind_solve(nb::module_& m);
-void bind_task(nb::module_& m);
-void bind_command(nb::module_& m);
-void bind_config(nb::module_& m);
-void bind_controller(nb::module_& m);
-void bind_guard(nb::module_& m);
-void bind_guiding(nb::module_& m);
 
 namespace {
 
@@ -43,14 +32,17 @@ void translate(const std::exception_ptr& error, void*) {
 NB_MODULE(_core, m) {
   m.doc() = "The control loop of proxcgal: geometry, robot, pipeline, solver, tick.";
   nb::register_exception_translator(translate);
+  using namespace proxcgal::binding;  // NOLINT(google-build-using-namespace)
   bind_geometry(m);
   bind_capsule(m);
   bind_robot(m);
+  bind_sense(m);
   bind_pipeline(m);
   bind_solve(m);
   bind_task(m);
   bind_command(m);
   bind_config(m);
+  bind_output(m);
   bind_controller(m);
   bind_guard(m);
   bind_guiding(m);

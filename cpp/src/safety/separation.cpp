@@ -50,16 +50,17 @@ void check(const SeparationConfig& config, double stop_time) {
   require(not_negative(config.min_distance), "min_distance", config.min_distance, "0 m or more");
   require(positive(config.max_velocity), "max_velocity", config.max_velocity, "above 0 m/s");
   require(positive(stop_time), "stop_time", stop_time, "above 0 s");
-  require(not_negative(config.iso.human_speed), "iso.human_speed", config.iso.human_speed,
-          "0 m/s or more");
-  require(not_negative(config.iso.reaction_time), "iso.reaction_time", config.iso.reaction_time,
-          "0 s or more");
-  const double lengths =
-      config.iso.intrusion + config.iso.human_uncertainty + config.iso.robot_uncertainty;
-  require(not_negative(lengths), "iso: intrusion and uncertainties", lengths, "0 m or more");
+  config.iso.validate();
 }
 
 }  // namespace
+
+void IsoSeparation::validate() const {
+  require(not_negative(human_speed), "iso.human_speed", human_speed, "0 m/s or more");
+  require(not_negative(reaction_time), "iso.reaction_time", reaction_time, "0 s or more");
+  const double lengths = intrusion + human_uncertainty + robot_uncertainty;
+  require(not_negative(lengths), "iso: intrusion and uncertainties", lengths, "0 m or more");
+}
 
 Capsule OperatorCapsule::at(const Pose& T_WT) const {
   const Vector3 middle = T_WT * offset_T;

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from proxcgal.errors import GeometryError, ModelError
 from proxcgal.models.joining import joined, rigid
 from proxcgal.models.meshes import check_mesh, clean, load_mesh
-from proxcgal.models.resolution import ControlMesh, control_mesh
+from proxcgal.models.resolution import ControlMesh, check_resolution, control_mesh
 from proxcgal.models.robots import Robot
 from proxcgal.models.triangles import Floats, Ints
 
@@ -69,7 +69,9 @@ def attach_mesh(
     Raises:
         ModelError: no such link, a pose that is none.
         GeometryError: a mesh that cannot be used.
+        ConfigError: vertices or max_deviation out of bounds.
     """
+    check_resolution("vertices", vertices, max_deviation)
     row = robot.description.link_row(link)
     T_LM = np.eye(4) if pose is None else rigid(pose, "pose")
     points, faces, dropped = _triangles_of(mesh)
@@ -98,9 +100,11 @@ def _triangles_of(mesh: Mesh) -> tuple[Floats, Ints, int]:
         return clean(*load_mesh(mesh), str(mesh))
     try:
         vertices, triangles = (np.asarray(part) for part in mesh)
+        if np.iscomplexobj(vertices):
+            raise TypeError
         points = np.asarray(vertices, dtype=np.float64)
     except (TypeError, ValueError):
-        raise GeometryError("mesh: a path, or (vertices, triangles), is needed") from None
+        raise GeometryError("mesh: a path, or (vertices, triangles) as arrays, is needed") from None
     if not np.issubdtype(triangles.dtype, np.integer):
         raise GeometryError(f"mesh: triangles are {triangles.dtype}; integers are needed")
     check_mesh(points, triangles, "mesh")

@@ -15,6 +15,7 @@ from proxcgal._core import Capsule, LinkCapsule
 from proxcgal.errors import ModelError
 from proxcgal.models.capsules import capsule_mesh
 from proxcgal.models.description import Frame, Joint, Link, RobotDescription
+from proxcgal.models.reading import transform
 from proxcgal.models.triangles import Floats
 
 Vector = Annotated[tuple[float, ...], Field(min_length=3, max_length=3)]
@@ -174,16 +175,3 @@ def read_capsule_robot(path: Path) -> CapsuleRobot:
             for problem in error.errors()
         ]
         raise ModelError("\n".join(lines)) from None
-
-
-def transform(position: Floats | tuple[float, ...], rpy: Floats | tuple[float, ...]) -> Floats:
-    """(4, 4) of a position [m] and roll, pitch, yaw [rad]: Rz(yaw) Ry(pitch) Rx(roll)."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
-    T = np.eye(4)
-    T[:3, :3] = (
-        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
-        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
-        (-sp, cp * sr, cp * cr),
-    )
-    T[:3, 3] = position
-    return T

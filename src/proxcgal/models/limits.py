@@ -9,6 +9,7 @@ import numpy as np
 
 from proxcgal.errors import ModelError
 from proxcgal.models.description import Joint, RobotDescription, listed
+from proxcgal.models.triangles import Floats
 
 PerJoint = float | Sequence[float] | Mapping[str, float]
 
@@ -102,6 +103,16 @@ def with_limits(
     return replace(description, joints=tuple(joints))
 
 
+def _numbers(value: object, what: str) -> Floats:
+    """(n,) of one number or a list of them."""
+    try:
+        return np.atleast_1d(np.asarray(value, dtype=np.float64)).ravel()
+    except (TypeError, ValueError):
+        raise ModelError(
+            f"{what} = {value!r}; one number, one for each joint, or numbers by joint name"
+        ) from None
+
+
 def _spread(
     value: PerJoint | None, names: Sequence[str], what: str, robot: str
 ) -> dict[str, float]:
@@ -113,9 +124,10 @@ def _spread(
             raise ModelError(
                 f"{what}: robot '{robot}' has no joint {listed(unknown)}; it has {listed(names)}"
             )
-        limits = {name: float(limit) for name, limit in value.items()}
+        given = _numbers(list(value.values()), what)
+        limits = dict(zip(value, given.tolist(), strict=True))
     else:
-        given = np.atleast_1d(np.asarray(value, dtype=np.float64)).ravel()
+        given = _numbers(value, what)
         if np.ndim(value) == 0:
             given = np.repeat(given, len(names))
         if len(given) != len(names):

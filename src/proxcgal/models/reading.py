@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -63,6 +63,19 @@ def numbers(text: str, count: int, what: str, most: float = FARTHEST) -> Floats:
 def is_direction(values: Floats) -> bool:
     """Whether an axis or a quaternion says which way."""
     return math.hypot(*values) > _NO_DIRECTION
+
+
+def transform(position: Sequence[float] | Floats, rpy: Sequence[float] | Floats) -> Floats:
+    """(4, 4) of a position [m] and roll, pitch, yaw [rad]: Rz(yaw) Ry(pitch) Rx(roll)."""
+    (cr, sr), (cp, sp), (cy, sy) = ((math.cos(angle), math.sin(angle)) for angle in rpy)
+    T = np.eye(4)
+    T[:3, :3] = (
+        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
+        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
+        (-sp, cp * sr, cp * cr),
+    )
+    T[:3, 3] = position
+    return T
 
 
 def build_link_mesh(
@@ -148,38 +161,9 @@ def describe(
     def placed(joint: int, pose: Floats) -> Floats:
         return pose if joint else T_WU @ pose
 
-    joints = []
-    for i in range(1, model.njoints):
-        kind = model.joints[i]
-        if kind.nv != 1:
-            raise ModelError(
-                f"{source}: joint '{model.names[i]}' has {kind.nv} degrees of freedom; revolute "
-                "and prismatic joints are read"
-            )
-        jacobian = pin.getJointJacobian(model, data, i, pin.LOCAL).reshape(6, model.nv)
-        motion = jacobian[:, kind.idx_v]
-        linear = np.linalg.norm(motion[:3]) > 0.5
-        axis = motion[:3] if linear else motion[3:]
-        low, high = limits.get(
-            model.names[i],
-            (model.lowerPositionLimit[kind.idx_q], model.upperPositionLimit[kind.idx_q]),
-        )
-        if kind.nq != 1:  # turns without end
-            low, high = -np.inf, np.inf
-        parent = model.parents[i]
-        joints.append(
-            Joint(
-                name=model.names[i],
-                type="prismatic" if linear else "revolute",
-                parent=parent - 1,
-                origin=placed(parent, model.jointPlacements[i].homogeneous),
-                axis=axis / np.linalg.norm(axis),
-                q_min=float(low),
-                q_max=float(high),
-                qd_max=speeds.get(model.names[i], np.nan),
-                qdd_max=np.nan,
-            )
-        )
+    joints = [
+        _joint(model, data, i, placed, limits, speeds, source) for i in range(1, model.njoints)
+    ]
     frames = tuple(
         Frame(
             name=key,
@@ -188,24 +172,9 @@ def describe(
         )
         for key, f in bodies.items()
     )
-    files: dict[Path, tuple[Floats, Ints]] = {}
-    links = []
-    for key, parts in shapes.items():
-        vertices, triangles, dropped = build_link_mesh(parts, key, files)
-        frame = next(f for f in frames if f.name == key)
-        links.append(
-            Link(
-                name=key,
-                joint=frame.joint,
-                T_JL=frame.T_JF,
-                vertices_L=vertices,
-                triangles=triangles,
-                dropped_faces=dropped,
-            )
-        )
+    links = _links(shapes, frames)
     if not links:
         raise ModelError(f"{source}: no link has a mesh or shape: nothing to keep away from things")
-    links.sort(key=lambda link: link.joint)
     return RobotDescription(
         name=name,
         joints=tuple(joints),
@@ -214,6 +183,66 @@ def describe(
         tool=_choose_tool(frames, joints),
         source=str(source),
     )
+
+
+def _joint(
+    model: Any,
+    data: Any,
+    row: int,
+    placed: Callable[[int, Floats], Floats],
+    limits: Mapping[str, tuple[float, float]],
+    speeds: Mapping[str, float],
+    source: Path,
+) -> Joint:
+    """One joint of pinocchio's model; `placed` brings what hangs on the universe to the base."""
+    import pinocchio as pin
+
+    name, kind, parent = model.names[row], model.joints[row], model.parents[row]
+    if kind.nv != 1:
+        raise ModelError(
+            f"{source}: joint '{name}' has {kind.nv} degrees of freedom; revolute and prismatic "
+            "joints are read"
+        )
+    jacobian = pin.getJointJacobian(model, data, row, pin.LOCAL).reshape(6, model.nv)
+    motion = jacobian[:, kind.idx_v]
+    linear = np.linalg.norm(motion[:3]) > 0.5
+    axis = motion[:3] if linear else motion[3:]
+    low, high = limits.get(
+        name, (model.lowerPositionLimit[kind.idx_q], model.upperPositionLimit[kind.idx_q])
+    )
+    if kind.nq != 1:  # turns without end
+        low, high = -np.inf, np.inf
+    return Joint(
+        name=name,
+        type="prismatic" if linear else "revolute",
+        parent=parent - 1,
+        origin=placed(parent, model.jointPlacements[row].homogeneous),
+        axis=axis / np.linalg.norm(axis),
+        q_min=float(low),
+        q_max=float(high),
+        qd_max=speeds.get(name, np.nan),
+        qdd_max=np.nan,
+    )
+
+
+def _links(shapes: Mapping[str, Sequence[Shape]], frames: Sequence[Frame]) -> list[Link]:
+    """Each link with its mesh, base first."""
+    files: dict[Path, tuple[Floats, Ints]] = {}
+    links = []
+    for name, parts in shapes.items():
+        vertices, triangles, dropped = build_link_mesh(parts, name, files)
+        frame = next(f for f in frames if f.name == name)
+        links.append(
+            Link(
+                name=name,
+                joint=frame.joint,
+                T_JL=frame.T_JF,
+                vertices_L=vertices,
+                triangles=triangles,
+                dropped_faces=dropped,
+            )
+        )
+    return sorted(links, key=lambda link: link.joint)
 
 
 def _choose_tool(frames: Sequence[Frame], joints: Sequence[Joint]) -> str:

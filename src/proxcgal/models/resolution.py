@@ -8,13 +8,24 @@ from dataclasses import dataclass
 import numpy as np
 
 from proxcgal._core import MeshTree
+from proxcgal.errors import ConfigError
 from proxcgal.models.cache import Cache, Stored, hash_mesh
 from proxcgal.models.decimation import decimate
 from proxcgal.models.subdivision import subdivide
-from proxcgal.models.triangles import Floats, Ints, compact, double_areas, sample
+from proxcgal.models.triangles import (
+    Floats,
+    Ints,
+    compact,
+    double_areas,
+    is_number,
+    sample,
+)
 
 # Bump when the same mesh and settings give another result.
 _VERSION = 2
+# Fewer enclose nothing that stands for a link; more are no mesh for a control loop, and fill the
+# memory before they are made.
+MIN_VERTICES, MAX_VERTICES = 8, 1_000_000
 # What counts as the number of vertices asked for.
 COUNT_TOLERANCE = 0.1
 # Deviation is measured at points this far apart [m], but never at more than so many a mesh.
@@ -33,6 +44,26 @@ class ControlMesh:
     vertices_L: Floats  # (v, 3) [m]
     triangles: Ints  # (f, 3)
     deviation: float  # how far it and the full mesh are apart at most, both ways [m]
+
+
+def check_resolution(name: str, count: object, max_deviation: object) -> None:
+    """Refuse what no control mesh can be made to.
+
+    Args:
+        name: of the argument that gives the count, for the message.
+        count: vertices asked for; None keeps a mesh as it is.
+        max_deviation: [m], may be inf.
+
+    Raises:
+        ConfigError: not a whole number within bounds, or a deviation that is not above 0.
+    """
+    whole = isinstance(count, int | np.integer) and MIN_VERTICES <= count <= MAX_VERTICES
+    if not (count is None or whole):
+        raise ConfigError(
+            f"{name} = {count!r}; a whole number from {MIN_VERTICES} to {MAX_VERTICES}, or None"
+        )
+    if not (is_number(max_deviation) and max_deviation > 0):
+        raise ConfigError(f"max_deviation = {max_deviation!r}; a number above 0 [m]")
 
 
 def control_mesh(

@@ -22,12 +22,10 @@ from proxcgal.models.description import RobotDescription, listed
 from proxcgal.models.limits import PerJoint, with_limits
 from proxcgal.models.paths import SUFFIXES, is_robot_file
 from proxcgal.models.read import read_description
-from proxcgal.models.resolution import COUNT_TOLERANCE, ControlMesh, control_mesh
+from proxcgal.models.resolution import COUNT_TOLERANCE, ControlMesh, check_resolution, control_mesh
 from proxcgal.models.triangles import Floats, Ints
 
 __all__ = ["Robot", "list_robots", "load_robot"]
-
-MIN_VERTICES = 8
 
 
 class Robot(_core.Robot):
@@ -38,20 +36,7 @@ class Robot(_core.Robot):
 
     def __init__(self, description: RobotDescription, control: Sequence[ControlMesh]) -> None:
         """Of a description, whose limits are complete, and one control mesh for each link."""
-        joints = [
-            _core.JointSpec(
-                name=joint.name,
-                type=joint.type,
-                parent=joint.parent,
-                origin=joint.origin,
-                axis=joint.axis,
-                q_min=joint.q_min,
-                q_max=joint.q_max,
-                qd_max=joint.qd_max,
-                qdd_max=joint.qdd_max,
-            )
-            for joint in description.joints
-        ]
+        joints = [_core.JointSpec(**asdict(joint)) for joint in description.joints]
         links = [
             _core.LinkSpec(
                 name=link.name,
@@ -169,12 +154,7 @@ def load_robot(
         GeometryError: a mesh that cannot be used.
         ConfigError: vertices_per_link or max_deviation out of bounds.
     """
-    if vertices_per_link is not None and vertices_per_link < MIN_VERTICES:
-        raise ConfigError(
-            f"vertices_per_link = {vertices_per_link}; at least {MIN_VERTICES}, or None"
-        )
-    if not max_deviation > 0:
-        raise ConfigError(f"max_deviation = {max_deviation}; more than 0 m")
+    check_resolution("vertices_per_link", vertices_per_link, max_deviation)
     builtin = BUILTIN.get(str(name_or_path))
     if builtin is not None:
         if package_dirs or base:

@@ -9,8 +9,9 @@ import numpy as np
 
 from proxcgal import _core
 from proxcgal.errors import ConfigError, GeometryError, ModelError
+from proxcgal.models.meshes import FARTHEST
 from proxcgal.models.robots import Robot
-from proxcgal.models.triangles import Floats, Ints
+from proxcgal.models.triangles import Floats, Ints, is_number
 
 _AXES = ("x", "y", "z")
 # Two longest sides are equal within this share; a link is flat whose third is below this one.
@@ -62,12 +63,20 @@ def ring_skin(
     Source: [WA] III: rings of VL53L8CX boards in printed covers round the arm.
     """
     vertices, triangles = robot.full_mesh(link)
-    fractions = [float(fraction) for fraction in np.atleast_1d(np.asarray(at, dtype=np.float64))]
+    try:
+        fractions = np.atleast_1d(np.asarray(at, dtype=np.float64)).ravel().tolist()
+    except (TypeError, ValueError):
+        raise GeometryError(f"at = {at!r}; fractions of the link's length are needed") from None
     if outside := [fraction for fraction in fractions if not 0 <= fraction <= 1]:
         raise GeometryError(f"ring at {outside[0]} of link '{link}'; 0 to 1 is needed")
-    if not fractions or sensors < 1 or int(sensors) != sensors:
+    if not (fractions and isinstance(sensors, int | np.integer) and sensors >= 1):
         raise GeometryError(f"{len(fractions)} rings of {sensors} sensors; at least one of each")
-    if not (np.isfinite(standoff) and standoff >= 0 and np.isfinite(phase)):
+    if not (
+        is_number(standoff)
+        and is_number(phase)
+        and 0 <= standoff <= FARTHEST
+        and np.isfinite(phase)
+    ):
         raise GeometryError(f"standoff = {standoff} m, phase = {phase} rad; 0 or more, and finite")
     begin, along, length = _axis(robot, link, vertices, axis)
     across = _reference(robot, link, along)

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.signedinteger[Any]]
+
+
+def is_number(value: object) -> TypeGuard[float]:
+    """Whether it is one number, of Python or of numpy; NaN is one."""
+    return isinstance(value, int | float | np.integer | np.floating)
 
 
 def compact(vertices: Floats, triangles: Ints) -> tuple[Floats, Ints]:

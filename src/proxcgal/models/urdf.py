@@ -18,7 +18,7 @@ from proxcgal.errors import GeometryError, ModelError
 from proxcgal.models.description import listed
 from proxcgal.models.meshes import box, cylinder, ellipsoid
 from proxcgal.models.paths import MeshFolders
-from proxcgal.models.reading import Shape, is_direction, number, numbers
+from proxcgal.models.reading import Shape, is_direction, number, numbers, transform
 from proxcgal.models.triangles import Floats, Ints
 
 MAX_LINKS = 1000
@@ -213,20 +213,14 @@ def _positive(sizes: Floats, where: str) -> Floats:
 
 
 def _origin(element: ET.Element, what: str) -> Floats:
-    """T (4, 4) of an <origin>: R = Rz(yaw) Ry(pitch) Rx(roll)."""
-    pose = np.eye(4)
+    """T (4, 4) of an <origin>."""
     origin = element.find("origin")
     if origin is None:
-        return pose
-    pose[:3, 3] = numbers(origin.get("xyz", "0 0 0"), 3, f"{what}, origin xyz")
-    roll, pitch, yaw = numbers(origin.get("rpy", "0 0 0"), 3, f"{what}, origin rpy")
-    (cr, sr), (cp, sp), (cy, sy) = ((math.cos(a), math.sin(a)) for a in (roll, pitch, yaw))
-    pose[:3, :3] = [
-        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-        [-sp, cp * sr, cp * cr],
-    ]
-    return pose
+        return np.eye(4)
+    return transform(
+        numbers(origin.get("xyz", "0 0 0"), 3, f"{what}, origin xyz"),
+        numbers(origin.get("rpy", "0 0 0"), 3, f"{what}, origin rpy"),
+    )
 
 
 def _axis(element: ET.Element, what: str) -> Floats:

@@ -30,6 +30,7 @@ struct IsoSeparation {
   double intrusion = 0.0;             ///< [m] C
   double human_uncertainty = 0.0;     ///< [m] Z_d
   double robot_uncertainty = 0.0;     ///< [m] Z_r
+  void validate() const;              ///< @throws ConfigError
 };
 
 /// S_p = v_h (T_r + T_s) + v_r T_r + v_r T_s / 2 + C + Z_d + Z_r [m]: constant speeds, constant
