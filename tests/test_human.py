@@ -238,6 +238,15 @@ def test_two_bones_meet_in_the_middle_joint_bent_towards_the_pole() -> None:
     assert ((joint * pole).sum(axis=1) >= 0.5 * (tip * pole).sum(axis=1) - 0.1).all()
 
 
+def test_a_table_that_begins_with_a_byte_order_mark_is_read(tmp_path: Path) -> None:
+    motion = motion_of("hri_task2", 5)
+    path = tmp_path / "walk.csv"
+    write_motion(Motion(motion.time[::50], motion.points_W[::50], motion.stature), path)
+    plain = read_motion(path)
+    path.write_text(path.read_text(encoding="utf-8"), encoding="utf-8-sig")
+    np.testing.assert_array_equal(read_motion(path).points_W, plain.points_W)
+
+
 def test_a_written_motion_is_read_back_and_played(tmp_path: Path) -> None:
     motion = motion_of("hri_task2", 5)
     path = tmp_path / "walk.csv"

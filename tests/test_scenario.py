@@ -6,14 +6,13 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pydantic import BaseModel
 
+from documented import rows_of
 from proxcgal import _core
 from proxcgal.errors import ConfigError
 from proxcgal.sim import toml
 from proxcgal.sim.scenario import Scenario, kinds, list_scenarios, load_scenario, parse_scenario
 from proxcgal.sim.scenario_joint import JointScenario
-from proxcgal.sim.scenario_problems import models_in
 
 DOCS = Path(__file__).parents[1] / "docs" / "scenarios.md"
 
@@ -163,6 +162,20 @@ def test_goal_needs_exactly_one_form(text: str) -> None:
     assert "exactly one of offset, position and waypoints" in line
 
 
+def test_a_key_with_a_hyphen_is_told_where_it_stands() -> None:
+    (line,) = told(MINIMAL, "controller.max-linear=1")
+    assert line.startswith(
+        "x.toml: override controller.max-linear = 1: unknown key; there are d_min, buffer"
+    )
+
+
+def test_a_name_of_the_users_own_is_told_whatever_it_is() -> None:
+    text = load_scenario("hri_task1").to_toml()
+    with pytest.raises(ConfigError) as error:
+        parse_scenario(text, "x.toml", ["operator.marks.float=[0, 1, 2]"])
+    assert str(error.value).startswith("x.toml: override operator.marks.float = [0, 1, 2]: must")
+
+
 def test_unknown_kind_lists_those_that_exist() -> None:
     (line,) = told(MINIMAL, "kind=maze")
     assert line == (
@@ -210,6 +223,7 @@ def test_overrides_take_toml_values_bare_strings_and_array_places() -> None:
         ("controller.d_min", "must have the form key.sub=value"),
         ("=3", "must have the form key.sub=value"),
         ("q0.9=1", "q0 has the entries 0 to 5, not 9"),
+        ("q0.²=1", "q0 has the entries 0 to 5, not ²"),
         ("seed.deeper=1", "seed is no table"),
     ],
 )
@@ -234,23 +248,14 @@ VALUES = st.recursive(
 )
 
 
-@given(st.dictionaries(st.from_regex(r"[a-z_]{1,8}", fullmatch=True), VALUES, max_size=5))
+@given(st.dictionaries(st.text(st.characters(exclude_categories=["Cs"])), VALUES, max_size=5))
 def test_written_toml_reads_back_exactly(table: dict[str, object]) -> None:
     assert repr(tomllib.loads(toml.write({"top": table}))["top"]) == repr(table)
 
 
-def rows_of(model: type[BaseModel], path: str = "") -> list[str]:
-    """The rows of the documentation's tables: key, default, meaning."""
-    rows = []
-    for name, field in model.model_fields.items():
-        key = f"{path}{field.alias or name}"
-        if inner := list(models_in(field.annotation)):
-            rows += rows_of(inner[0], f"{key}.")
-        else:
-            value = field.get_default(call_default_factory=True, validated_data={})
-            default = "required" if field.is_required() else toml.format_value(value)
-            rows.append(f"| `{key}` | {default} | {field.description} |".replace("None", "-"))
-    return rows
+def test_places_may_have_any_name_and_resolved_text_keeps_it() -> None:
+    scenario = load_scenario("hri_task1", ["operator.places.left shelf=[1, 2, 3]"])
+    assert parse_scenario(scenario.to_toml(), "again") == scenario
 
 
 def test_every_key_is_documented_with_its_default() -> None:

@@ -1,6 +1,7 @@
 """Walk-throughs: taught by a simulated hand, watched, recorded, cleaned, played back."""
 
 import csv
+import errno
 import io
 import json
 import os
@@ -17,23 +18,21 @@ from typing import Any
 import numpy as np
 import polars as pl
 import pytest
-from pydantic import BaseModel
 
+from documented import rows_of
 from proxcgal.apps.walkthrough import lines_of
 from proxcgal.errors import ConfigError, RecordingError
 from proxcgal.models.builtin import ga_ol
-from proxcgal.sim import toml
 from proxcgal.sim.physics import Physics
 from proxcgal.sim.scenario import load_scenario, parse_scenario
-from proxcgal.sim.scenario_problems import models_in
 from proxcgal.sim.trial import run_trial
 from proxcgal.sim.walk import playback
 from proxcgal.sim.walk.guided import off_path
 from proxcgal.sim.walk.keys import GuidedScenario, Leg, WalkScenario
 from proxcgal.sim.walk.log import WalkLog
 from proxcgal.sim.walk.playback import check_start, play
-from proxcgal.sim.walk.poses import read_poses
-from proxcgal.sim.walk.run import WalkResult
+from proxcgal.sim.walk.poses import PoseRecorder, read_poses
+from proxcgal.sim.walk.run import WalkResult, run_walk
 from proxcgal.sim.walk.setup import PERIOD, WalkSetup
 from proxcgal.sim.walk.stops import STRETCHED, worst_stops
 from proxcgal.sim.walk.taught import TaughtPath, clean, to_csv, to_trajectory, tool_positions
@@ -214,6 +213,26 @@ def test_every_pose_written_before_a_kill_can_be_read(tmp_path: Path) -> None:
     np.testing.assert_allclose(np.diff(poses.time), PERIOD, atol=1e-12)
 
 
+def test_part_of_a_path_is_not_played_where_the_disk_was_full(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    setup = setup_of("walkthrough_teach", *SHORT)
+    write = PoseRecorder.write
+
+    def until_full(recorder: PoseRecorder, time: float, *pose: Any) -> None:
+        if time < 2.0:
+            write(recorder, time, *pose)
+        elif recorder.failure is None:
+            recorder._fail(OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
+
+    monkeypatch.setattr(PoseRecorder, "write", until_full)
+    with (
+        pytest.warns(RuntimeWarning, match="No space left"),
+        pytest.raises(RecordingError, match=r"No space left.*not the whole path"),
+    ):
+        run_walk(setup, seed=0, recording=tmp_path / "taught.mcap")
+
+
 def test_a_file_that_holds_no_teaching_is_refused(tmp_path: Path) -> None:
     (tmp_path / "other.mcap").write_bytes(b"\x89MCAP0\r\n")
     with pytest.raises(RecordingError, match="holds no poses"):
@@ -317,20 +336,6 @@ def test_every_key_is_documented_with_its_default() -> None:
     missing = [row for row in rows_of(WalkScenario) if row not in text and "`kind`" not in row]
     static = SCENARIOS.read_text()
     assert [row for row in missing if row not in static and not row.startswith(OTHERS)] == []
-
-
-def rows_of(model: type[BaseModel], path: str = "") -> list[str]:
-    """The rows of the documentation's tables: key, default, meaning."""
-    rows = []
-    for name, field in model.model_fields.items():
-        key = f"{path}{field.alias or name}"
-        if inner := list(models_in(field.annotation)):
-            rows += rows_of(inner[0], f"{key}.")
-        else:
-            value = field.get_default(call_default_factory=True, validated_data={})
-            default = "required" if field.is_required() else toml.format_value(value)
-            rows.append(f"| `{key}` | {default} | {field.description} |".replace("None", "-"))
-    return rows
 
 
 def test_ratings_of_a_users_own_are_read_and_what_is_wrong_is_told(tmp_path: Path) -> None:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, get_args
+from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
 
 from proxcgal.sim import toml
 
@@ -25,7 +26,7 @@ def lines(
     """
     told: dict[str, list[str]] = {}
     for problem in _first_causes(error.errors()):
-        key = ".".join(_steps(problem)) or "file"
+        key = ".".join(_steps(model, problem["loc"])) or "file"
         is_override = any(key == name or key.startswith(f"{name}.") for name in overridden)
         place = f"{origin}: {'override ' if is_override else ''}{key}"
         subject, allowed = _sentence(model, problem)
@@ -35,10 +36,7 @@ def lines(
 
 def describe_keys(model: type[BaseModel]) -> dict[str, str]:
     """Keys of one table, each with what it means."""
-    return {
-        field.alias or name: field.description or "a table"
-        for name, field in model.model_fields.items()
-    }
+    return {name: field.description or "a table" for name, field in _fields(model).items()}
 
 
 def models_in(annotation: Any) -> Iterator[type[BaseModel]]:
@@ -63,19 +61,38 @@ def _first_causes(problems: Sequence[Any]) -> list[Any]:
     ]
 
 
-def _steps(problem: Any) -> list[str]:
-    """The path to the key; pydantic puts the tried type of a union in, which is no key."""
-    return [
-        str(step)
-        for step in problem["loc"]
-        if isinstance(step, int)
-        or not (step in ("int", "str", "float") or "-" in step or "[" in step)
-    ]
+def _steps(model: type[BaseModel], loc: Sequence[int | str]) -> list[str]:
+    """The path to the key; pydantic puts the tried type of a union in, which is no key.
+
+    A name is a key where the schema has a table there, or a dictionary of the user's own names.
+    """
+    steps: list[str] = []
+    place: Any = model
+    for step in loc:
+        if isinstance(step, int):
+            steps.append(str(step))
+        elif (table := next(models_in(place), None)) is not None:
+            steps.append(step)
+            place = _fields(table)[step].annotation if step in _fields(table) else None
+        elif (values := _values_in(place)) is not None:
+            steps.append(step)
+            place = values
+    return steps
+
+
+def _fields(model: type[BaseModel]) -> dict[str, FieldInfo]:
+    """By the names that the file has for them."""
+    return {field.alias or name: field for name, field in model.model_fields.items()}
+
+
+def _values_in(annotation: Any) -> Any:
+    """What a dictionary type holds; None for any other type."""
+    return get_args(annotation)[1] if get_origin(annotation) is dict else None
 
 
 def _sentence(model: type[BaseModel], problem: Any) -> tuple[str, str]:
     """` = value` and what is allowed instead."""
-    steps, kind = _steps(problem), problem["type"]
+    steps, kind = _steps(model, problem["loc"]), problem["type"]
     if kind == "missing":
         meaning = _keys_at(model, steps[:-1]).get(steps[-1], "")
         return "", "missing" + (f"; {meaning}" if meaning else "")
@@ -98,7 +115,7 @@ def _keys_at(model: type[BaseModel], steps: Sequence[str]) -> dict[str, str]:
     for step in steps:
         if step.isdigit():
             continue
-        fields = {field.alias or name: field for name, field in model.model_fields.items()}
+        fields = _fields(model)
         if step not in fields:
             return {}
         model = next(models_in(fields[step].annotation), model)

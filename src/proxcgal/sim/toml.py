@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import tomllib
 from collections.abc import Mapping
 from typing import Any
@@ -11,6 +12,8 @@ from typing import Any
 from proxcgal.errors import ConfigError
 
 Table = dict[str, Any]
+
+_BARE = re.compile(r"[A-Za-z0-9_-]+")  # a key that needs no quotes
 
 
 def parse(text: str, origin: str) -> Table:
@@ -46,7 +49,7 @@ def override(table: Table, assignment: str) -> None:
     for depth, step in enumerate(steps):
         last = depth == len(steps) - 1
         if isinstance(place, list):
-            if not (step.isdigit() and int(step) < len(place)):
+            if not (step.isdecimal() and int(step) < len(place)):
                 raise ConfigError(
                     f"override {assignment!r}: {'.'.join(steps[:depth])} has the entries "
                     f"0 to {len(place) - 1}, not {step}"
@@ -73,13 +76,21 @@ def format_value(value: object) -> str:
             return "nan"
         return repr(value) if math.isfinite(value) else ("inf" if value > 0 else "-inf")
     if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+        return _quoted(value)
     if isinstance(value, list | tuple):
         return "[" + ", ".join(format_value(item) for item in value) + "]"
     if isinstance(value, Mapping):
-        pairs = ", ".join(f"{key} = {format_value(item)}" for key, item in value.items())
+        pairs = ", ".join(f"{_key(key)} = {format_value(item)}" for key, item in value.items())
         return "{" + pairs + "}"
     return str(value)
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _key(name: str) -> str:
+    return name if _BARE.fullmatch(name) else _quoted(name)
 
 
 def _is_tables(value: object) -> bool:
@@ -87,16 +98,16 @@ def _is_tables(value: object) -> bool:
 
 
 def write(table: Mapping[str, Any], path: str = "") -> str:
-    """TOML text of nested tables; keys that are None are left out."""
+    """TOML text of nested tables; keys that are None are left out, `path` is as written."""
     plain, nested = [], []
     for key, value in table.items():
         if value is None:
             continue
-        name = f"{path}.{key}" if path else key
+        name = f"{path}.{_key(key)}" if path else _key(key)
         if isinstance(value, Mapping):
             nested.append(f"\n[{name}]\n" + write(value, name))
         elif _is_tables(value):
             nested.extend(f"\n[[{name}]]\n" + write(item, name) for item in value)
         else:
-            plain.append(f"{key} = {format_value(value)}\n")
+            plain.append(f"{_key(key)} = {format_value(value)}\n")
     return "".join(plain) + "".join(nested)

@@ -38,7 +38,7 @@ def read_motion(path: str | Path) -> Motion:
             do not rise, a part of the body without length, a body without legs.
     """
     try:
-        with Path(path).open(newline="", encoding="utf-8") as file:
+        with Path(path).open(newline="", encoding="utf-8-sig") as file:
             reader = csv.reader(file)
             names = [name.strip() for name in next(reader, [])]
             missing = [name for name in HEADER if name not in names]

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from proxcgal.errors import RecordingError
 from proxcgal.sim.walk.log import WalkLog
 from proxcgal.sim.walk.playback import Played, play
 from proxcgal.sim.walk.poses import PoseRecorder, read_poses
@@ -73,6 +74,7 @@ def run_walk(
 
     Raises:
         ConfigError: what does not fit, or a recording that cannot be written.
+        RecordingError: the recording stopped before the path's end: part of a path is not played.
         SimulationError: MuJoCo warned.
     """
     check_duration(setup.scenario)
@@ -81,6 +83,8 @@ def run_walk(
         log = teach(setup, seed=seed, recorder=recorder, with_truth=True, on_progress=on_progress)
     if log.trips:
         return WalkResult(log, stops=stops_of(setup, seed) + worst_stops(setup))
+    if recorder.failure is not None:
+        raise RecordingError(f"{recorder.failure}; what it holds is not the whole path")
     poses = read_poses(recording)
     keys = setup.scenario.playback
     path = clean(setup.robot, poses.time, poses.q, step=keys.step, tolerance=keys.tolerance)
