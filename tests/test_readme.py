@@ -15,13 +15,15 @@ ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
 
 
-def blocks(language: str) -> list[str]:
-    return re.findall(rf"^```{language}\n(.*?)^```", README, re.MULTILINE | re.DOTALL)
+def blocks(language: str, text: str = README) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
 
 
-def commands() -> list[str]:
+def commands(text: str = README) -> list[str]:
     lines = [
-        line.partition("#")[0].strip() for block in blocks("sh") for line in block.splitlines()
+        line.partition("#")[0].strip()
+        for block in blocks("sh", text)
+        for line in block.splitlines()
     ]
     return [line for line in lines if line]
 
@@ -41,6 +43,29 @@ def test_the_python_blocks_run_in_their_order(tmp_path: Path) -> None:
 def test_a_command_of_the_readme_parses(line: str) -> None:
     _, command, *arguments = shlex.split(line)
     assert cli.parse(command, arguments) is not None
+
+
+def test_every_command_of_the_docs_parses() -> None:
+    lines = {
+        line: path.name
+        for path in sorted((ROOT / "docs").glob("*.md"))
+        for line in commands(path.read_text())
+        if line.startswith("proxcgal ")
+    }
+    assert len(set(lines.values())) >= 3
+    for line in lines:
+        _, command, *arguments = shlex.split(line)
+        assert cli.parse(command, arguments) is not None, line
+
+
+@pytest.mark.parametrize("document", ["joint_robot.md"])
+def test_the_python_blocks_of_a_document_run_in_their_order(document: str, tmp_path: Path) -> None:
+    code = "\n".join(blocks("python", (ROOT / "docs" / document).read_text()))
+    assert "px." in code
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize("line", [c for c in commands() if c.startswith("./run ")])

@@ -11,7 +11,7 @@ namespace {
 
 /// No farther than points may be: squares would overflow, and a distance be wrong in silence.
 Vector3 place_from(nb::handle value, const char* name) {
-  const Vector3 place = vector3_from(value, name);
+  Vector3 place = vector3_from(value, name);
   if (place.cwiseAbs().maxCoeff() <= kFarthest) return place;
   throw GeometryError(std::string(name) + " is farther than 1e9 m from the origin");
 }

@@ -74,6 +74,7 @@ std::vector<NamedPair> closest_pairs_all(const Robot& robot, nb::handle q, nb::h
     closest_pairs(robot, posture, points_W(), {}, pairs);
   }
   std::vector<NamedPair> out;
+  out.reserve(pairs.size());
   for (const ClosestPair& pair : pairs) out.push_back(named(robot, pair));
   return out;
 }
