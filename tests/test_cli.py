@@ -116,6 +116,8 @@ def test_scenarios_and_robots_are_listed_with_a_line_each(call: Call) -> None:
         (["run", "front_plane", "--set", "controller.d_min=-1"], ["controller.d_min", "-1"]),
         (["run", "front_plane", "--set", "durration=3"], ["durration", "duration"]),
         (["run", "front_plane", "--set", "duration"], ["key.sub=value"]),
+        (["run", "front_plane", "--set"], ["--set: given without a value"]),
+        (["run", "front_plane", "--package-dir"], ["--package-dir: given without a value"]),
         (["run", "front_plane", "--robot", "panda"], ["q0 has 6 values"]),
         (["run", "front_plane", "--controller", "ws"], ["ws"]),
         (["run", "walkthrough_teach", "--controller", "sm"], ["--controller", "no controllers"]),

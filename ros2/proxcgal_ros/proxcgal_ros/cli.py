@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 from pathlib import Path
 
 from rclpy.utilities import remove_ros_args
 
-from proxcgal.errors import ProxError
+from proxcgal.errors import ConfigError, ProxError
 
 
 def main() -> int:
@@ -50,12 +51,19 @@ def _sim(options: argparse.Namespace, arguments: list[str]) -> int:
     from proxcgal_ros.processes import spinning
     from proxcgal_ros.sim import SimulatedArm, SimulatedSensors, sensors_beside
 
-    scenario = load_scenario(options.scenario, options.set)
-    seed = scenario.seed if options.seed is None else options.seed
+    seed = [] if options.seed is None else [f"seed={options.seed}"]
+    scenario = load_scenario(options.scenario, seed + options.set)
+    if scenario.kind == "walkthrough":
+        raise ConfigError(
+            f'{options.scenario} has kind = "walkthrough", whose arm a hand guides: it takes no '
+            "velocities and carries no sensors"
+        )
+    if options.out is not None and not _writable(options.out):
+        raise ConfigError(f"--out {options.out}: cannot be written")
     node: SimulatedArm | SimulatedSensors
     with spinning(arguments) as (executor, running):
         if options.only == "scans":
-            node = SimulatedSensors(executor, running, scenario, seed)
+            node = SimulatedSensors(executor, running, scenario)
         else:
             node = SimulatedArm(executor, running, scenario)
         executor.add_node(node)
@@ -66,6 +74,12 @@ def _sim(options: argparse.Namespace, arguments: list[str]) -> int:
     if options.out is not None and isinstance(node, SimulatedArm):
         node.write(options.out)
     return 0
+
+
+def _writable(path: Path) -> bool:
+    """Can such a file be made, and its folder? Nothing is."""
+    folder = next(one for one in path.absolute().parents if one.exists())
+    return not path.is_dir() and folder.is_dir() and os.access(folder, os.W_OK)
 
 
 def _joint(options: argparse.Namespace, arguments: list[str]) -> int:

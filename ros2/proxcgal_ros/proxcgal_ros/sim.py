@@ -146,16 +146,14 @@ class _Begun:
 class SimulatedSensors(Node):
     """Ride on the arm that the joint states tell of, and measure where those were stamped."""
 
-    def __init__(
-        self, executor: Executor, running: Callable[[], bool], scenario: Scenario, seed: int
-    ) -> None:
+    def __init__(self, executor: Executor, running: Callable[[], bool], scenario: Scenario) -> None:
         """Loads the scenario. Raises: ProxError."""
         super().__init__("proxcgal_sensors")
         self._executor, self._running = executor, running
         endless = change_scenario(scenario, "sensors", [f"duration={ENDLESS}"])
         setup = Setup.of(endless)
         self._world = _Begun(World(setup.robot, setup.scene))
-        self._source = SimulatedSource(setup, self._world, seed)  # type: ignore[arg-type]
+        self._source = SimulatedSource(setup, self._world, scenario.seed)  # type: ignore[arg-type]
         self._names = list(setup.robot.joint_names)
         self._period = 1.0 / scenario.simulation.control_hz
         self._q = setup.q0.copy()

@@ -27,8 +27,14 @@ Flag = Annotated[bool, tyro.conf.arg(help_behavior_hint="")]
 Number = Annotated[int | None, tyro.conf.arg(metavar="N", help_behavior_hint="")]
 
 
-def flat(groups: tuple[tuple[T, ...], ...]) -> list[T]:
-    """The values of all the times an option was given, in order."""
+def flat(groups: tuple[tuple[T, ...], ...], option: str = "--set") -> list[T]:
+    """The values of all the times an option was given, in order.
+
+    Raises:
+        ConfigError: it was given without any.
+    """
+    if () in groups:
+        raise ConfigError(f"{option}: given without a value")
     return [value for group in groups for value in group]
 
 

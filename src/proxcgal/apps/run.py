@@ -144,7 +144,8 @@ def overrides(options: RunOptions) -> list[str]:
         path = Path(options.robot).expanduser()
         is_file = is_robot_file(path)
         changes.append("robot=" + json.dumps(str(path.absolute()) if is_file else options.robot))
-    folders = [str(path.expanduser().absolute()) for path in flat(options.package_dir)]
+    given = flat(options.package_dir, "--package-dir")
+    folders = [str(path.expanduser().absolute()) for path in given]
     if folders:
         changes.append("package_dirs=" + json.dumps(folders))
     if options.subject is not None:
