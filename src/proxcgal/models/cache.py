@@ -7,6 +7,7 @@ import hashlib
 import json
 import os
 import tempfile
+import threading
 import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -17,6 +18,9 @@ from numpy.typing import NDArray
 
 Arrays = dict[str, NDArray[Any]]
 _META = "meta"
+# numpy reads an array's header with `ast.literal_eval`, which up to Python 3.11.4 fails with a
+# SystemError now and then where several threads do it (python/cpython#106905).
+_HEADERS = threading.Lock()
 
 
 class Stored:
@@ -50,7 +54,7 @@ class Cache:
             return None
         try:
             # zip carries a checksum of every array: a damaged file raises here.
-            with np.load(path, allow_pickle=False) as file:
+            with _HEADERS, np.load(path, allow_pickle=False) as file:
                 arrays = {name: file[name] for name in file.files}
             meta = json.loads(arrays.pop(_META).tobytes())
             return Stored(arrays, meta) if isinstance(meta, dict) else None
