@@ -157,7 +157,6 @@ def measure(bench: Bench, seconds: float) -> tuple[list[float], ...]:
         if beat and (cycle // SENSOR_EVERY) % 2 == 0:
             loose, made = made, {}
         sleep_until(due)
-        bench.listen(0.0)
         bench.forget()
         begun = time.monotonic()
         bench.send_scans(made)
