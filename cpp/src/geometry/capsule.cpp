@@ -17,7 +17,9 @@ struct Candidate {
 void take_nearer(const Capsule& a, const Capsule& b, double share_a, double share_b,
                  Candidate& best) {
   const double distance = (a.at(share_a) - b.at(share_b)).stableNorm();
-  if (distance < best.distance) best = {share_a, share_b, distance};
+  // What is no number stays, whatever the next candidate is.
+  if (distance >= best.distance || std::isnan(best.distance)) return;
+  best = {share_a, share_b, distance};
 }
 
 /// Any unit vector across `direction`; across z where it has no length.
@@ -85,7 +87,8 @@ double closing_speed(const CapsulePair& pair, const CapsuleMotion& a, const Caps
 double approach_speed(const Vector3& point, const Vector3& velocity, const Capsule& to) {
   const Vector3 way = to.at(nearest_share(point, to.start, to.end)) - point;
   const double length = way.stableNorm();
-  return length > kOnAxis ? way.dot(velocity) / length : velocity.stableNorm();
+  if (length <= kOnAxis) return velocity.stableNorm();
+  return way.dot(velocity) / length;
 }
 
 }  // namespace proxcgal

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <numbers>
 #include <sstream>
+#include <utility>
 
 #include "proxcgal/safety/guard.hpp"
 #include "require.hpp"
@@ -69,6 +70,17 @@ class Draw {
   std::uint64_t state_ = 1;
 };
 
+/// What a joint is drawn from: its range, of which one turn tells all.
+std::pair<double, double> range_of(const Robot& robot, Eigen::Index k) {
+  constexpr double pi = std::numbers::pi, rail = 10.0;  // [m] of one without limits
+  const double low = robot.q_min()[k], high = robot.q_max()[k];
+  const bool turns = robot.spec().joints[static_cast<std::size_t>(k)].type == JointType::kRevolute;
+  if (turns && low <= -pi && high >= pi) return {-pi, pi};
+  const double span = turns ? 2.0 * pi : rail;
+  if (std::isinf(low)) return {std::min(high, 0.5 * span) - span, std::min(high, 0.5 * span)};
+  return {low, turns || std::isinf(high) ? std::min(high, low + span) : high};
+}
+
 void add_pairs(const Robot& robot, const Separation& separation,
                std::vector<Contradiction>& found) {
   std::vector<double> best(separation.pairs().size(), -kInfinity);
@@ -77,9 +89,10 @@ void add_pairs(const Robot& robot, const Separation& separation,
   JointVector q(robot.n_q());
   Draw draw;
   for (int i = 0; i < kPostures; ++i) {
-    for (Eigen::Index k = 0; k < q.size(); ++k)
-      q[k] = draw(std::max(robot.q_min()[k], -std::numbers::pi),
-                  std::min(robot.q_max()[k], std::numbers::pi));
+    for (Eigen::Index k = 0; k < q.size(); ++k) {
+      const auto [low, high] = range_of(robot, k);
+      q[k] = draw(low, high);
+    }
     robot.update(q, posture);
     bool all_fine = true;
     for (std::size_t pair = 0; pair < best.size(); ++pair) {

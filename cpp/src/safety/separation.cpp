@@ -96,7 +96,10 @@ const SeparationOutput& Separation::update(const Robot& robot, const Posture& po
   out = SeparationOutput{};
   for (const int row : pairs_) {
     const double distance = this->distance(row, posture);
-    if (!(distance >= out.distance)) out = {.distance = distance, .pair = row};
+    // What is no number stays: it must not be passed over for the next one.
+    if (distance >= out.distance || std::isnan(out.distance)) continue;
+    out.distance = distance;
+    out.pair = row;
   }
   // [WT] 2.2: each link's far end, projected on the direction to the operator's axis.
   const Capsule human_W = config_.human.at(posture.T_WT);
@@ -109,10 +112,9 @@ const SeparationOutput& Separation::update(const Robot& robot, const Posture& po
     robot.jacobian(posture, capsule.link, end_W, J);
     const Vector3 velocity = J.topRows<3>() * qd - own;
     const double speed = approach_speed(end_W, velocity, human_W);
-    if (!(speed <= out.velocity)) {
-      out.velocity = speed;
-      out.end = row;
-    }
+    if (speed <= out.velocity || std::isnan(out.velocity)) continue;
+    out.velocity = speed;
+    out.end = row;
   }
   // Written so that NaN is never fine.
   out.distance_ok = out.distance >= config_.min_distance;

@@ -36,7 +36,8 @@ double nearest_share(const Vector3& point, const Vector3& start, const Vector3& 
 ///
 /// Exact in all degenerate cases: axes without length, parallel, crossing, identical. Where axes
 /// are parallel and many pairs of points are nearest, it is one of them. Where they meet there is
-/// no direction between them: the normal is across both. Allocates nothing.
+/// no direction between them: the normal is across both. An end that is no number gives a distance
+/// that is none. Allocates nothing.
 CapsulePair closest(const Capsule& a, const Capsule& b);
 
 /// How fast the distance falls [m/s]: positive where the nearest points move towards each other.
