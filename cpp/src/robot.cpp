@@ -59,13 +59,15 @@ void check(const RobotSpec& spec) {
   }
   if (spec.links.empty()) throw ModelError("robot '" + spec.name + "' has no link with a mesh");
   for (const LinkSpec& link : spec.links) {
-    if (link.joint < -1 || link.joint >= n)
-      bad("link '" + link.name + "'", "its joint does not exist");
-    if (!(link.mesh_error >= 0.0))
-      bad("link '" + link.name + "'", "its mesh error must be 0 or more");
+    const std::string what = "link '" + link.name + "'";
+    if (link.joint < -1 || link.joint >= n) bad(what, "its joint does not exist");
+    if (!link.T_JL.matrix().allFinite()) bad(what, "its pose is not finite");
+    if (!(link.mesh_error >= 0.0 && std::isfinite(link.mesh_error)))
+      bad(what, "its mesh error must be finite and 0 m or more");
   }
   if (spec.tool_joint < -1 || spec.tool_joint >= n)
     bad("tool '" + spec.tool + "'", "its joint does not exist");
+  if (!spec.T_JT.matrix().allFinite()) bad("tool '" + spec.tool + "'", "its pose is not finite");
 }
 
 /// The links' trees, built side by side.
