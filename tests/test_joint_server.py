@@ -195,6 +195,22 @@ def test_tasks_change_by_name_between_goals_only() -> None:
             arm.set_tasks(["full"])
 
 
+def test_an_arm_that_moves_keeps_to_its_accelerations_when_the_tasks_change() -> None:
+    with server("joint_free", "finish.position=0.5", "finish.angle=2.0") as arm:
+        number = arm.send_goal(px.JointGoal(translation=REACHED, init="jl"))
+        assert arm.wait(number) is not None  # half a metre before the goal: it is still moving
+        stands = [arm.q]
+        for tick in range(4):
+            arm.step()
+            stands.append(arm.q)
+            if tick == 1:
+                arm.set_tasks(["thesis"])
+        qd = np.diff(stands, axis=0) / arm.period
+        assert np.abs(qd[1]).max() > 0.05
+        change = np.abs(np.diff(qd, axis=0)).max(axis=0)
+        assert np.all(change <= arm.robot.qdd_max * arm.period + 1e-9)
+
+
 def test_a_stop_outlives_a_change_of_tasks_and_a_goal_that_waits_to_begin() -> None:
     with server() as arm:
         arm.send_goal(px.JointGoal(translation=REACHED))

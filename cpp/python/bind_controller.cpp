@@ -116,6 +116,16 @@ void bind_controller(nb::module_& m) {
            "seen and commanded, and the mode, stay.\n\n"
            "Raises:\n    ConfigError: other tasks or another order, a value out of bounds; nothing "
            "is changed then.")
+      .def(
+          "go_on_from",
+          [](Controller& c, nb::handle qd) {
+            c.go_on_from(vector_from(qd, "qd", c.robot().n_q(), Take::kConvert));
+          },
+          "qd"_a,
+          "Commands go on from this velocity (n_q,) [rad/s or m/s] instead of from rest: for a "
+          "controller that takes over an arm that moves.\n\n"
+          "Raises:\n    ConfigError: above a joint's speed limit.\n    GeometryError: an array of "
+          "the wrong shape or type, or not finite.")
       .def_prop_ro(
           "robot", [](const Controller& c) -> const Robot& { return c.robot(); },
           nb::rv_policy::reference_internal, "That it was set up with.")

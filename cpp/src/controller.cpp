@@ -1,27 +1,24 @@
 #include "proxcgal/controller.hpp"
 
-#include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "caution.hpp"
 #include "control_points.hpp"
+#include "execution.hpp"
 #include "internal_clock.hpp"
-#include "own_pairs.hpp"
 #include "perception.hpp"
 #include "proxcgal/error.hpp"
+#include "require.hpp"
 #include "stopwatch.hpp"
+#include "task_stack.hpp"
 #include "tick_history.hpp"
 #include "velocities.hpp"
 
 namespace proxcgal {
 namespace {
 
-constexpr double kExecuted = 0.5;     // share of the demanded rate that counts as executed
-constexpr double kEngaged = 0.5;      // activation from which avoidance must be executed
-constexpr double kJustBeyond = 1e-6;  // [m]
-constexpr double kRounding = 1e-9;    // [s] of sums of periods: it decides about no tick
-constexpr double kRigid = 1e-6;       // how far a goal's rotation may be from orthonormal
+constexpr double kRigid = 1e-6;          // how far a goal's rotation may be from orthonormal
+constexpr double kSpeedRounding = 1e-9;  // [rad/s] or [m/s]
 
 bool is_rigid(const Pose& T) {
   return T.matrix().allFinite() &&
@@ -38,21 +35,19 @@ struct Controller::Impl {
   Monitor monitor;
   detail::Perception perception;
   detail::ControlPoints control_points;
-  detail::OwnPairs own_pairs;
+  detail::TaskStack stack;
   detail::Caution caution;
+  detail::Execution execution;
   Limits limits;
   detail::InternalClock clock;
 
   detail::TickHistory history;
-  double stuck_since = -1.0;  // [s] internal, negative while avoidance is executed
   bool mounts_accepted;
 
   JointVector qd_last;
   Posture posture;
   const Points none_W = Points(0, 3);
   Points estimate_W = Points::Zero(1, 3);  // velocity of the closest obstacle [m/s]
-  std::array<BuiltTask, kMaxLevels> built;
-  std::array<Task, kMaxLevels> stack;
   Solution solution;
   TickOutput out;
 
@@ -63,13 +58,13 @@ struct Controller::Impl {
         monitor(config.monitor),
         perception(robot, skin, config),
         control_points(*robot, skin, config),
-        own_pairs(*robot, config),
+        stack(*robot, skin, config),
         caution(*robot, skin, config),
+        execution(config),
         limits{robot->q_min(), robot->q_max(), robot->qd_max(), robot->qdd_max()},
         clock(config.period),
         mounts_accepted(!config.monitor.await_mounts),
         posture(robot->make_posture()) {
-    for (const TaskSpec& task : config.tasks) proxcgal::validate(task, *robot);
     if (!limits.qd_max.allFinite() || !limits.qdd_max.allFinite()) {
       throw ConfigError("robot '" + robot->spec().name +
                         "' has a joint without a speed or acceleration limit: give both");
@@ -99,135 +94,6 @@ struct Controller::Impl {
     return joints && rigid;
   }
 
-  void build(const Avoidance& spec, const PointsRef& cloud_W, const detail::Velocities& velocities,
-             BuiltTask& task) {
-    std::span<const ControlPair> controls;
-    if (config.control_point == ControlPoint::kSensor) {
-      controls = control_points.sensor(skin, posture, cloud_W, velocities);
-    } else if (spec.nearest > 1) {
-      // The nearest link is told even where nothing is active yet.
-      const double nearest =
-          out.pair_distance() < kInfinity ? out.pair_distance() + kJustBeyond : 0.0;
-      const double within = std::max(spec.d_min + spec.buffer, nearest);
-      controls =
-          control_points.links(*robot, posture, cloud_W, spec.nearest, within, velocities, monitor);
-    } else if (out.pair) {
-      controls = control_points.one(caution.control(out, velocities.of(out.pair->point)));
-    }
-    if (!controls.empty()) out.control = controls.front();
-    build_avoidance(spec, *robot, posture, controls, task);
-  }
-
-  void build(const SelfCollision& spec, BuiltTask& task) {
-    const std::span<const LinkPair> pairs = own_pairs.nearest(spec, *robot, posture, monitor);
-    if (!pairs.empty()) out.own = pairs.front();
-    build_self_collision(spec, *robot, posture, pairs, task);
-  }
-
-  void build_stack(const PointsRef& cloud_W, const detail::Velocities& velocities,
-                   const Pose& goal) {
-    for (std::size_t level = 0; level < config.tasks.size(); ++level) {
-      BuiltTask& task = built[level];
-      task.smallest_row_norm = kInfinity;
-      std::visit(
-          [&](const auto& spec) {
-            using Spec = std::decay_t<decltype(spec)>;
-            if constexpr (std::is_same_v<Spec, Avoidance>) build(spec, cloud_W, velocities, task);
-            if constexpr (std::is_same_v<Spec, Reach>)
-              build_reach(spec, *robot, posture, goal, task);
-            if constexpr (std::is_same_v<Spec, JointLimits>)
-              build_joint_limits(spec, *robot, posture, task);
-            if constexpr (std::is_same_v<Spec, MinimumAltitude>)
-              build_minimum_altitude(spec, *robot, posture, task);
-            if constexpr (std::is_same_v<Spec, Manipulability>)
-              build_manipulability(spec, *robot, posture, task);
-            if constexpr (std::is_same_v<Spec, SelfCollision>) build(spec, task);
-          },
-          config.tasks[level]);
-      const bool active = (task.task.activation.array() > 0.0).any();
-      if (task.smallest_row_norm < kSmallRowNorm && active) {
-        note(Reason::kRowSmall);
-      }
-      stack[level] = task.task;
-    }
-  }
-
-  /// Within this distance having nothing to move away is a cause to hold [m].
-  double engaged_within() const {
-    double reach = 0.0;
-    if (config.control_point == ControlPoint::kSensor) return reach;  // another point is moved
-    for (const TaskSpec& task : config.tasks) {
-      if (const auto* avoid = std::get_if<Avoidance>(&task))
-        reach = std::max(reach, avoid->d_min + avoid->buffer);
-    }
-    return reach;
-  }
-
-  /// Avoidance makes up what the command gives it less than the solver does, with the joints of
-  /// which no more important task of another kind wants anything now.
-  void catch_up_avoidance(std::span<const JointVector> levels, const Admissible& box) {
-    for (std::size_t level = config.tasks.size(); level-- > 0;) {
-      if (!std::holds_alternative<Avoidance>(config.tasks[level])) continue;
-      Admissible free = box;
-      for (std::size_t upper = 0; upper < level; ++upper) {
-        if (std::holds_alternative<Avoidance>(config.tasks[upper])) continue;
-        const Task& task = stack[upper];
-        for (Eigen::Index row = 0; row < task.activation.size(); ++row) {
-          if (!(task.activation[row] > 0.0)) continue;
-          for (Eigen::Index joint = 0; joint < out.qd.size(); ++joint) {
-            if (task.jacobian(row, joint) == 0.0) continue;
-            free.low[joint] = free.high[joint] = out.qd[joint];
-          }
-        }
-      }
-      catch_up(levels, stack[level], free, out.qd);
-    }
-  }
-
-  /// Is it acceleration alone that avoidance is short of, as after a HOLD that has cleared? Then
-  /// the position and velocity limits let the row have its share once there was time.
-  bool in_time(std::size_t level, Eigen::Index row, const Admissible& box) const {
-    Admissible steady = box;
-    steady.low = box.steady_low;
-    steady.high = box.steady_high;
-    JointVector qd = out.qd;
-    command({solution.rho.data(), static_cast<std::size_t>(solution.levels) + 1},
-            std::span<const Task>(stack.data(), config.tasks.size()), qd_last, steady, qd);
-    return !(residual(stack[level], qd)[row] > kExecuted * stack[level].rate[row]);
-  }
-
-  /// Was avoidance asked for more than the command gives?
-  /// @param cut_back  the command was cut back for what is not seen: more time would not help
-  void judge(const Admissible& box, bool cut_back) {
-    for (std::size_t level = 0; level < config.tasks.size(); ++level) {
-      if (!std::holds_alternative<Avoidance>(config.tasks[level])) continue;
-      const Task& task = stack[level];
-      const RowVector missing = residual(task, out.qd);
-      for (Eigen::Index row = 0; row < task.rate.size(); ++row) {
-        const bool engaged = task.activation[row] > kEngaged && task.rate[row] > 0.0;
-        if (engaged && missing[row] > kExecuted * task.rate[row]) {
-          note(Reason::kNotExecuted, out.control.link);
-          // Outside d_min the goal may well hold against it: there the arm may come to rest.
-          // The baseline moves another point than the pair's, and is left as it is published.
-          const bool whole_body = config.control_point == ControlPoint::kWholeBody;
-          stuck(whole_body && caution.inside(out) && (cut_back || !in_time(level, row, box)));
-          return;
-        }
-      }
-    }
-    stuck(false);
-  }
-
-  void stuck(bool now) {
-    if (!now) {
-      stuck_since = -1.0;
-    } else if (stuck_since < 0.0) {
-      stuck_since = clock.now();
-    } else if (clock.now() - stuck_since > config.monitor.stuck_after + kRounding) {
-      note(Reason::kAvoidanceStuck, out.control.link);
-    }
-  }
-
   /// The limits of a nominal period, with no more change of velocity than the time since the last
   /// command allows: a tick may come early. Braking in time stays possible: until the next command
   /// the joint moves at this one for a nominal period at most.
@@ -239,22 +105,13 @@ struct Controller::Impl {
     return box;
   }
 
-  /// What each task wanted, and what is missing of it in the command that is issued.
-  void report() {
-    for (std::size_t level = 0; level < config.tasks.size(); ++level) {
-      const Task& task = stack[level];
-      out.tasks[level] = {task_name(config.tasks[level]), task.rate, task.activation,
-                          residual(task, out.qd)};
-    }
-  }
-
   /// From the joint state and a cloud to an admissible velocity.
   /// @param sensed  the cloud is the sensors', row by row; else it is known
   void act(const JointVector& q, const PointsRef& cloud_W, bool sensed,
            const detail::Velocities& velocities, const Pose& goal) {
     detail::Stopwatch watch(config.timings);
     out.pair = control_points.nearest(clock.now(), *robot, posture, cloud_W, caution.d_min(),
-                                      engaged_within(), monitor);
+                                      stack.engaged_within(), monitor);
     if (sensed) {
       caution.trust_sensed(clock.now(), posture, perception, control_points, out, monitor);
     } else {
@@ -267,27 +124,26 @@ struct Controller::Impl {
       estimate_W.row(0) = out.obstacle_velocity_W.transpose();
       const PointsRef moving_W(estimate_W);
       const detail::Velocities estimated(moving_W, cloud_W, obstacle_W, config.motion->radius);
-      build_stack(cloud_W, estimated, goal);
+      stack.build(posture, cloud_W, estimated, goal, control_points, caution, out, monitor);
     } else {
-      build_stack(cloud_W, velocities, goal);
+      stack.build(posture, cloud_W, velocities, goal, control_points, caution, out, monitor);
     }
     out.timings.distance_us = watch.lap_us();
-    const std::span<const Task> tasks(stack.data(), config.tasks.size());
-    solve(tasks, robot->n_q(), limits.qd_max, config.solver, solution);
+    solve(stack.tasks(), robot->n_q(), limits.qd_max, config.solver, solution);
     // By the last tick's mode: this one's findings are not complete yet.
     const double scale = monitor.slowed() ? config.monitor.degraded_scale : 1.0;
     const Admissible box = admissible_now(q, scale);
     const std::span<const JointVector> levels(solution.rho.data(),
                                               static_cast<std::size_t>(solution.levels) + 1);
-    command(levels, tasks, qd_last, box, out.qd);
-    catch_up_avoidance(levels, box);
+    command(levels, stack.tasks(), qd_last, box, out.qd);
+    stack.catch_up(levels, box, out.qd);
     // What is known to be there has the last word over what may be where nothing is seen.
     const JointVector solved = out.qd;
     if (sensed) caution.slow_into_unseen(clock.now(), posture, perception, box, out, monitor);
     const bool cut_back = (out.qd.array() != solved.array()).any();
     caution.keep_off(posture, box, out);
     out.timings.solve_us = watch.lap_us();
-    judge(box, cut_back);
+    execution.judge(clock.now(), stack, {levels, qd_last, box, cut_back}, caution, out, monitor);
     if ((q.array() < limits.q_min.array() || q.array() > limits.q_max.array()).any())
       note(Reason::kOutsideLimits);
   }
@@ -311,7 +167,7 @@ struct Controller::Impl {
       if (usable) caution.keep_off(posture, box, out);
     }
     qd_last = out.qd;
-    if (usable) report();
+    if (usable) stack.report(out);
     history.add(clock.caller(), q, robot->n_q(), out, monitor.findings());
   }
 
@@ -415,28 +271,17 @@ bool Controller::reset() {
   return left;
 }
 void Controller::retune(const std::vector<TaskSpec>& tasks) {
-  std::vector<TaskSpec>& mine = impl_->config.tasks;
-  const bool same =
-      std::equal(tasks.begin(), tasks.end(), mine.begin(), mine.end(),
-                 [](const TaskSpec& a, const TaskSpec& b) { return a.index() == b.index(); });
-  if (!same) {
-    std::string names;
-    for (const TaskSpec& task : mine)
-      names += std::string(names.empty() ? "" : ", ") + task_name(task);
-    throw ConfigError("tasks: other values are taken for the same tasks in the same order: " +
-                      names);
-  }
-  for (std::size_t level = 0; level < tasks.size(); ++level) {
-    const auto* to = std::get_if<SelfCollision>(&tasks[level]);
-    if (to != nullptr && to->pairs != std::get<SelfCollision>(mine[level]).pairs)
-      throw ConfigError("self_collision.pairs: are chosen at set-up; the other values may change");
-  }
-  ControllerConfig changed = impl_->config;
-  changed.tasks = tasks;
-  changed.validate();
-  for (const TaskSpec& task : tasks) proxcgal::validate(task, *impl_->robot);
-  mine = tasks;
+  impl_->config.tasks = detail::retuned(impl_->config, tasks, *impl_->robot).tasks;
   impl_->caution.retune(tasks);
+}
+void Controller::go_on_from(const JointVector& qd) {
+  const JointVector& most = impl_->limits.qd_max;
+  const bool fits = qd.size() == most.size() && qd.allFinite() &&
+                    (qd.cwiseAbs().array() <= most.array() + kSpeedRounding).all();
+  require(fits, "qd", qd.transpose(),
+          std::to_string(most.size()) + " finite numbers within the joints' speed limits");
+  impl_->qd_last = qd;
+  impl_->out.qd = qd;
 }
 
 }  // namespace proxcgal

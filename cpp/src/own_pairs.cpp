@@ -64,6 +64,8 @@ std::span<const LinkPair> OwnPairs::nearest(const SelfCollision& spec, const Rob
     const Vector3 apart_W = T_WA * round_a.center - T_WB * round_b.center;
     if (!(apart_W.norm() - round_a.radius - round_b.radius < reach)) continue;
     const Pose T_AB = T_WA.inverse() * T_WB;
+    // A wider reach than it was searched for, as after `retune`: nothing is known out there.
+    if (!pair.found && pair.within < reach) pair.searched = false;
     double since = pair.searched ? moved(pair.T_AB, T_AB, round_b) : kInfinity;
     if (pair.searched && pair.at_least - since >= reach) continue;
     if (since > kStale) {
@@ -110,6 +112,7 @@ void OwnPairs::search(Watched& pair, const Robot& robot, const Pose& T_AB, doubl
   }
   pair.at_least = std::min(distance, bound);
   pair.T_AB = T_AB;
+  pair.within = within;
   pair.searched = true;
 }
 

@@ -27,6 +27,7 @@ class OwnPairs {
   struct Watched {
     int a, b;
     Pose T_AB;                         // when it was searched last
+    double within = 0.0;               // [m] and how far
     double at_least = 0.0;             // [m] no nearer than this then
     Vector3 on_a_A = Vector3::Zero();  // nearest points found
     Vector3 on_b_B = Vector3::Zero();

@@ -170,6 +170,27 @@ TEST(Controller, CommandsStayWithinLimits) {
   }
 }
 
+TEST(Controller, OneThatTakesOverAMovingArmGoesOnFromItsVelocity) {
+  const auto robot = test::arm();
+  const Points none(0, 3);
+  Controller first(robot, Skin{}, ControllerConfig{}), second(robot, Skin{}, ControllerConfig{});
+  JointVector q = bent(), last;
+  const Pose goal = goal_near(*robot, q);
+  for (int i = 0; i < 30; ++i) {
+    last = first.tick_known(0.01 * i, q, none, goal).qd;
+    q += 0.01 * last;
+  }
+  ASSERT_GT(last.cwiseAbs().maxCoeff(), 0.2);  // more than one tick could brake
+  second.go_on_from(last);
+  EXPECT_EQ(second.tick_known(0.0, q, none, goal).qd, first.tick_known(0.3, q, none, goal).qd);
+  JointVector fast = last;
+  fast[0] = 2.1;
+  EXPECT_THROW(second.go_on_from(fast), ConfigError);
+  EXPECT_THROW(second.go_on_from(JointVector::Zero(5)), ConfigError);
+  fast[0] = std::nan("");
+  EXPECT_THROW(second.go_on_from(fast), ConfigError);
+}
+
 TEST(Controller, TheCloudStaysInWorldBetweenScans) {
   const auto robot = test::arm();
   Controller controller(robot, test::ring(), ControllerConfig{});

@@ -170,6 +170,11 @@ class Controller {
   /// was commanded and the mode stay. Not part of the tick: it may throw, and changes nothing then.
   /// @throws ConfigError  other tasks or another order, a value out of bounds
   void retune(const std::vector<TaskSpec>& tasks);
+  /// Commands go on from a velocity instead of from rest: for a controller that takes over an arm
+  /// that moves. Not part of the tick.
+  /// @param qd  (n_q,) commanded last [rad/s] or [m/s]
+  /// @throws ConfigError  another size, not finite, above a joint's limit
+  void go_on_from(const JointVector& qd);
 
  private:
   struct Impl;

@@ -79,13 +79,14 @@ class JointArm:
         return ", ".join(sorted({f.reason for f in self.last.findings} if self.last else ()))
 
     def set_tasks(self, tasks: Sequence[str], off: Sequence[str]) -> None:
-        """Another stack, at rest. Raises: ConfigError, an unknown name."""
+        """Another stack; the commands go on. Raises: ConfigError, an unknown name."""
         from proxcgal.sim.scenario import change_scenario
 
         changes = [f"controller.{k}={list(v)!r}" for k, v in (("tasks", tasks), ("off", off))]
         changed = change_scenario(self.setup.scenario, "tasks", changes)
         self.setup = replace(self.setup, scenario=changed)
         self.law = self._made()
+        self.law.go_on_from(self.qd)  # the arm may still come to rest after its last goal
 
     def reset(self) -> bool:
         """Leaves a STOP of the monitor; False while its cause lasts, and where there is none."""
