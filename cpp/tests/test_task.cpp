@@ -1,84 +1,27 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <functional>
 #include <numbers>
 
 #include "allocations.hpp"
-#include "meshes.hpp"
 #include "proxcgal/error.hpp"
-#include "proxcgal/pipeline/task.hpp"
+#include "task_rows.hpp"
 
 namespace proxcgal {
 namespace {
 
+using test::at;
+using test::bent_arm;
+using test::derivative;
+using test::pair_at;
 using test::Random;
-
-/// An arm with bent axes; some joints may slide, the last may be free of limits.
-Robot arm(int n, const std::vector<int>& sliding = {}) {
-  RobotSpec spec;
-  spec.name = "arm";
-  for (int j = 0; j < n; ++j) {
-    JointSpec joint;
-    joint.name = "joint" + std::to_string(j);
-    joint.parent = j - 1;
-    joint.origin.translation() = Vector3(0.1 * (j % 2), 0.05, 0.3);
-    joint.axis = j % 3 == 0 ? Vector3::UnitZ() : (j % 3 == 1 ? Vector3::UnitY() : Vector3::UnitX());
-    if (std::find(sliding.begin(), sliding.end(), j) != sliding.end()) {
-      joint.type = JointType::kPrismatic;
-    }
-    joint.q_min = -2.0;
-    joint.q_max = 3.0;
-    spec.joints.push_back(joint);
-  }
-  const auto mesh = test::box(Vector3(0.1, 0.1, 0.1));
-  spec.links = {{"base", -1, Pose::Identity(), mesh.vertices, mesh.triangles, 0.0},
-                {"hand", n - 1, Pose::Identity(), mesh.vertices, mesh.triangles, 0.0}};
-  spec.tool_joint = n - 1;
-  spec.T_JT.translation() = Vector3(0.05, 0.1, 0.2);
-  return Robot(std::move(spec));
-}
-
-JointVector random_q(Random& random, int n) {
-  JointVector q(n);
-  for (double& value : q) value = random.uniform(-1.5, 1.5);
-  return q;
-}
-
-Posture at(const Robot& robot, const JointVector& q) {
-  Posture posture = robot.make_posture();
-  robot.update(q, posture);
-  return posture;
-}
-
-/// Central differences of a function of the posture.
-RowVector derivative(const Robot& robot, const JointVector& q,
-                     const std::function<double(const Posture&)>& f) {
-  constexpr double h = 1e-6;
-  RowVector out(q.size());
-  for (Eigen::Index j = 0; j < q.size(); ++j) {
-    JointVector ahead = q, behind = q;
-    ahead[j] += h;
-    behind[j] -= h;
-    out[j] = (f(at(robot, ahead)) - f(at(robot, behind))) / (2.0 * h);
-  }
-  return out;
-}
+using test::random_q;
 
 double manipulability(const Robot& robot, const Posture& posture, int first, int size) {
   Jacobian6 J;
   robot.tool_jacobian(posture, J);
   const auto columns = J.middleCols(first, size);
   return std::sqrt(std::max((columns * columns.transpose()).determinant(), 0.0));
-}
-
-ControlPair pair_at(const Posture& posture, const Vector3& point_L, const Vector3& obstacle_W) {
-  ControlPair pair;
-  pair.link = 1;
-  pair.control_W = posture.T_WL[1] * point_L;
-  pair.obstacle_W = obstacle_W;
-  pair.distance = (pair.control_W - obstacle_W).norm();
-  return pair;
 }
 
 TEST(Bells, GoFromOneToZeroWithoutAStep) {
@@ -89,93 +32,8 @@ TEST(Bells, GoFromOneToZeroWithoutAStep) {
   EXPECT_NEAR(increasing(0.225, 0.2, 0.3), 0.5 - std::sqrt(0.125), 1e-12);
 }
 
-TEST(Avoidance, RowIsTheDerivativeOfTheDistanceScaledToUnitNorm) {
-  const Robot robot = arm(6, {2});
-  Random random(1);
-  for (int i = 0; i < 50; ++i) {
-    const JointVector q = random_q(random, 6);
-    const Posture posture = at(robot, q);
-    const Vector3 point_L = random.vector(0.1);
-    const Vector3 obstacle_W = posture.T_WL[1] * point_L + random.vector(0.3);
-    ControlPair pair = pair_at(posture, point_L, obstacle_W);
-    pair.obstacle_velocity_W = Vector3(0.1, -0.2, 0.3);
-    BuiltTask built;
-    const Avoidance spec;
-    build_avoidance(spec, robot, posture, {&pair, 1}, built);
-    const RowVector slope = derivative(
-        robot, q, [&](const Posture& p) { return (p.T_WL[1] * point_L - obstacle_W).norm(); });
-    const double norm = slope.norm();
-    EXPECT_LT((built.task.jacobian.row(0).transpose() - slope / norm).norm(), 1e-7);
-    EXPECT_NEAR(built.smallest_row_norm, norm, 1e-7);
-    EXPECT_NEAR(row_norm(robot, posture, pair), norm, 1e-7);
-    const Vector3 normal_W = (pair.control_W - obstacle_W) / pair.distance;
-    const double rate = normal_W.dot(pair.obstacle_velocity_W) + 2.0 * (0.3 - pair.distance);
-    EXPECT_NEAR(built.task.rate[0], rate / norm, 1e-6);
-    EXPECT_NEAR(built.task.activation[0], decreasing(pair.distance, 0.2, 0.3), 1e-12);
-  }
-}
-
-TEST(Avoidance, GivesOneRowForEachPair) {
-  const Robot robot = arm(6);
-  Random random(2);
-  const Posture posture = at(robot, random_q(random, 6));
-  std::vector<ControlPair> pairs(kMaxRows + 3);
-  for (ControlPair& pair : pairs) {
-    pair = pair_at(posture, random.vector(0.1), random.vector(1.0));
-  }
-  BuiltTask built;
-  build_avoidance({}, robot, posture, {pairs.data(), 3}, built);
-  EXPECT_EQ(built.task.jacobian.rows(), 3);
-  build_avoidance({}, robot, posture, pairs, built);
-  EXPECT_EQ(built.task.jacobian.rows(), kMaxRows);
-  build_avoidance({}, robot, posture, {}, built);
-  EXPECT_EQ(built.task.rate.size(), 0);
-}
-
-TEST(Avoidance, IsFiniteWhereThePointsCoincide) {
-  const Robot robot = arm(6);
-  Random random(3);
-  const Posture posture = at(robot, random_q(random, 6));
-  ControlPair pair = pair_at(posture, Vector3::Zero(), posture.T_WL[1].translation());
-  BuiltTask built;
-  build_avoidance({}, robot, posture, {&pair, 1}, built);
-  EXPECT_TRUE(built.task.jacobian.isZero());
-  EXPECT_EQ(built.smallest_row_norm, 0.0);
-  EXPECT_EQ(built.task.activation[0], 1.0);
-  EXPECT_TRUE(built.task.rate.allFinite());
-  pair.fallback_normal_W = Vector3::UnitX();
-  build_avoidance({}, robot, posture, {&pair, 1}, built);
-  EXPECT_NEAR(built.task.jacobian.row(0).norm(), 1.0, 1e-12);
-}
-
-TEST(Avoidance, ANegativeDistanceTurnsTheNormal) {
-  const Robot robot = arm(6);
-  Random random(4);
-  const Posture posture = at(robot, random_q(random, 6));
-  ControlPair pair = pair_at(posture, Vector3(0.05, 0, 0), posture.T_WL[1] * Vector3(0.03, 0, 0));
-  BuiltTask outside, inside;
-  build_avoidance({}, robot, posture, {&pair, 1}, outside);
-  pair.distance = -pair.distance;
-  build_avoidance({}, robot, posture, {&pair, 1}, inside);
-  EXPECT_EQ(inside.task.jacobian, -outside.task.jacobian);
-  EXPECT_GT(inside.task.rate[0], outside.task.rate[0]);
-}
-
-TEST(Avoidance, ARowTooSmallToScaleIsLeftAndTold) {
-  const Robot robot = arm(3);
-  const Posture posture = at(robot, JointVector::Zero(3));
-  ControlPair pair;
-  pair.link = 0;  // the base: no joint moves it
-  pair.control_W = Vector3::UnitX();
-  pair.distance = 1.0;
-  BuiltTask built;
-  build_avoidance({}, robot, posture, {&pair, 1}, built);
-  EXPECT_EQ(built.smallest_row_norm, 0.0);
-  EXPECT_TRUE(built.task.jacobian.isZero());
-}
-
 TEST(Reach, PullsStraightToTheGoalWithinItsBounds) {
-  const Robot robot = arm(6);
+  const Robot robot = bent_arm(6);
   Random random(5);
   const Posture posture = at(robot, random_q(random, 6));
   Pose goal = posture.T_WT;
@@ -197,7 +55,7 @@ TEST(Reach, PullsStraightToTheGoalWithinItsBounds) {
 }
 
 TEST(Reach, ForHalfOfTheGoalIsHalfOfItsRows) {
-  const Robot robot = arm(6);
+  const Robot robot = bent_arm(6);
   Random random(41);
   const Posture posture = at(robot, random_q(random, 6));
   Pose goal = posture.T_WT;
@@ -244,7 +102,7 @@ TEST(RotationError, TurnsOneFrameIntoTheOtherUpToAHalfTurn) {
 }
 
 TEST(JointLimits, PullToTheMiddleNearALimitOnly) {
-  const Robot robot = arm(4);  // -2 to 3
+  const Robot robot = bent_arm(4);  // -2 to 3
   JointVector q(4);
   q << 0.0, 2.85, -2.0, 3.5;
   BuiltTask built;
@@ -258,7 +116,7 @@ TEST(JointLimits, PullToTheMiddleNearALimitOnly) {
 }
 
 TEST(JointLimits, LeaveAJointWithoutLimitsAlone) {
-  RobotSpec spec = arm(3).spec();
+  RobotSpec spec = bent_arm(3).spec();
   spec.joints[0].q_min = -kInfinity;
   spec.joints[0].q_max = kInfinity;
   spec.joints[1].q_min = -kInfinity;
@@ -277,7 +135,7 @@ TEST(JointLimits, LeaveAJointWithoutLimitsAlone) {
 }
 
 TEST(MinimumAltitude, RowIsTheDerivativeOfTheToolsHeight) {
-  const Robot robot = arm(6);
+  const Robot robot = bent_arm(6);
   Random random(7);
   const JointVector q = random_q(random, 6);
   const Posture posture = at(robot, q);
@@ -296,7 +154,7 @@ TEST(MinimumAltitude, RowIsTheDerivativeOfTheToolsHeight) {
 TEST(Manipulability, RowIsItsDerivative) {
   Random random(8);
   for (const auto& sliding : {std::vector<int>{}, std::vector<int>{0, 3}, std::vector<int>{6}}) {
-    const Robot robot = arm(7, sliding);
+    const Robot robot = bent_arm(7, sliding);
     for (int i = 0; i < 20; ++i) {
       const JointVector q = random_q(random, 7);
       const Posture posture = at(robot, q);
@@ -315,7 +173,7 @@ TEST(Manipulability, RowIsItsDerivative) {
 }
 
 TEST(Manipulability, OfTheSecondArmDependsOnItsOwnJointsOnly) {
-  const Robot robot = arm(12);
+  const Robot robot = bent_arm(12);
   Random random(9);
   const JointVector q = random_q(random, 12);
   const Posture posture = at(robot, q);
@@ -335,7 +193,7 @@ TEST(Manipulability, OfTheSecondArmDependsOnItsOwnJointsOnly) {
 
 TEST(Manipulability, LeadsOutOfASingularPosture) {
   // Two aligned axes: a wrist with its middle joint straight.
-  RobotSpec spec = arm(6).spec();
+  RobotSpec spec = bent_arm(6).spec();
   for (std::size_t j = 4; j < 6; ++j) spec.joints[j].origin = Pose::Identity();
   const Vector3 axes[] = {Vector3::UnitZ(), Vector3::UnitY(), Vector3::UnitY(),
                           Vector3::UnitZ(), Vector3::UnitY(), Vector3::UnitZ()};
@@ -351,58 +209,14 @@ TEST(Manipulability, LeadsOutOfASingularPosture) {
 }
 
 TEST(Manipulability, NeedsSixJoints) {
-  const Robot robot = arm(5);
+  const Robot robot = bent_arm(5);
   BuiltTask built;
   build_manipulability({}, robot, at(robot, JointVector::Zero(5)), built);
   EXPECT_TRUE(built.task.jacobian.isZero());
   EXPECT_EQ(built.smallest_row_norm, 0.0);
   EXPECT_THROW(validate(TaskSpec{Manipulability{}}, robot), ConfigError);
-  EXPECT_THROW(validate(TaskSpec{Manipulability{.first_joint = 1}}, arm(6)), ConfigError);
-  EXPECT_NO_THROW(validate(TaskSpec{Manipulability{}}, arm(6)));
-}
-
-TEST(SelfCollision, RowIsTheDerivativeOfTheDistanceBetweenTwoPointsOfLinks) {
-  const Robot robot = arm(6);
-  Random random(11);
-  for (int i = 0; i < 30; ++i) {
-    const JointVector q = random_q(random, 6);
-    const Posture posture = at(robot, q);
-    const int a = robot.n_links() - 1;
-    const int b = 0;
-    const Vector3 on_a_L = random.vector(0.1);
-    const Vector3 on_b_L = random.vector(0.1);
-    const auto apart = [&](const Posture& p) {
-      return (p.T_WL[static_cast<std::size_t>(a)] * on_a_L -
-              p.T_WL[static_cast<std::size_t>(b)] * on_b_L)
-          .norm();
-    };
-    LinkPair pair{.a = a, .b = b};
-    pair.on_a_W = posture.T_WL[static_cast<std::size_t>(a)] * on_a_L;
-    pair.on_b_W = posture.T_WL[static_cast<std::size_t>(b)] * on_b_L;
-    pair.distance = apart(posture);
-    const SelfCollision spec{.d_min = pair.distance - 0.05, .buffer = 0.1};
-    BuiltTask built;
-    build_self_collision(spec, robot, posture, {&pair, 1}, built);
-    const RowVector slope = derivative(robot, q, apart);
-    EXPECT_LT((parting_row(robot, posture, pair) - slope).norm(), 1e-6);
-    EXPECT_LT((built.task.jacobian.row(0).transpose() - slope.normalized()).norm(), 1e-6);
-    EXPECT_NEAR(built.task.rate[0], 2.0 * 0.05 / slope.norm(), 1e-5);
-    EXPECT_NEAR(built.task.activation[0], 0.5, 1e-9);
-  }
-}
-
-TEST(SelfCollision, LinksThatCrossArePartedAlongTheFallback) {
-  const Robot robot = arm(6);
-  Random random(12);
-  const Posture posture = at(robot, random_q(random, 6));
-  LinkPair pair{.a = robot.n_links() - 1, .b = 0, .distance = 0.0};
-  pair.on_a_W = pair.on_b_W = Vector3(0.1, 0.2, 0.3);
-  pair.fallback_normal_W = Vector3::UnitX();
-  BuiltTask built;
-  build_self_collision({}, robot, posture, {&pair, 1}, built);
-  EXPECT_TRUE(built.task.jacobian.allFinite());
-  EXPECT_GT(built.task.jacobian.norm(), 0.9);
-  EXPECT_EQ(built.task.activation[0], 1.0);
+  EXPECT_THROW(validate(TaskSpec{Manipulability{.first_joint = 1}}, bent_arm(6)), ConfigError);
+  EXPECT_NO_THROW(validate(TaskSpec{Manipulability{}}, bent_arm(6)));
 }
 
 TEST(TaskSpec, NamesTheFieldItsValueAndItsBound) {
@@ -429,7 +243,7 @@ TEST(TaskSpec, NamesTheFieldItsValueAndItsBound) {
 }
 
 TEST(Tasks, AllocateNothing) {
-  const Robot robot = arm(7);
+  const Robot robot = bent_arm(7);
   Random random(10);
   const Posture posture = at(robot, random_q(random, 7));
   const ControlPair pair = pair_at(posture, Vector3(0.05, 0, 0), Vector3(0.1, 0.1, 0.1));

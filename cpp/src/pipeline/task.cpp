@@ -3,7 +3,6 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <numbers>
 
 #include "proxcgal/error.hpp"
@@ -79,8 +78,6 @@ Eigen::Index arm_size(const Manipulability& spec, Eigen::Index n) {
   return spec.joints > 0 ? spec.joints : n - spec.first_joint;
 }
 
-bool positive(double value) { return std::isfinite(value) && value > 0.0; }
-
 }  // namespace
 
 JointVector opening_row(const Robot& robot, const Posture& posture, const ControlPair& pair) {
@@ -106,67 +103,6 @@ double decreasing(double x, double a, double b) {
 }
 
 double increasing(double x, double a, double b) { return 1.0 - decreasing(x, a, b); }
-
-void Avoidance::validate() const {
-  require(std::isfinite(d_min) && d_min >= 0.0, "Avoidance.d_min", d_min,
-          "finite and at least 0 m");
-  require(positive(buffer), "Avoidance.buffer", buffer, "finite and above 0 m");
-  require(positive(gain), "Avoidance.gain", gain, "finite and above 0 1/s");
-  require(nearest >= 1 && nearest <= kMaxRows, "Avoidance.nearest", nearest,
-          "between 1 and " + std::to_string(kMaxRows));
-}
-
-void Reach::validate() const {
-  require(positive(gain), "Reach.gain", gain, "finite and above 0 1/s");
-  require(positive(max_linear), "Reach.max_linear", max_linear, "finite and above 0 m/s");
-  require(positive(max_angular), "Reach.max_angular", max_angular, "finite and above 0 rad/s");
-}
-
-void JointLimits::validate() const {
-  require(positive(gain), "JointLimits.gain", gain, "finite and above 0 1/s");
-  require(positive(margin), "JointLimits.margin", margin, "finite and above 0 rad");
-}
-
-void MinimumAltitude::validate() const {
-  require(std::isfinite(height), "MinimumAltitude.height", height, "finite [m]");
-  require(positive(buffer), "MinimumAltitude.buffer", buffer, "finite and above 0 m");
-  require(positive(gain), "MinimumAltitude.gain", gain, "finite and above 0 1/s");
-}
-
-void Manipulability::validate() const {
-  require(positive(target), "Manipulability.target", target, "finite and above 0");
-  require(std::isfinite(low) && low >= 0.0, "Manipulability.low", low, "finite and at least 0");
-  require(std::isfinite(high) && high > low, "Manipulability.high", high, "finite and above low");
-  require(positive(gain), "Manipulability.gain", gain, "finite and above 0 1/s");
-  require(first_joint >= 0 && first_joint < kMaxJoints, "Manipulability.first_joint", first_joint,
-          "between 0 and " + std::to_string(kMaxJoints - 1));
-  require(joints == 0 || (joints >= 6 && joints <= kMaxJoints), "Manipulability.joints", joints,
-          "0 (all) or between 6 and " + std::to_string(kMaxJoints));
-  require(positive(unit), "Manipulability.unit", unit, "finite and above 0");
-}
-
-void SelfCollision::validate() const {
-  require(std::isfinite(d_min) && d_min >= 0.0, "SelfCollision.d_min", d_min,
-          "finite and at least 0 m");
-  require(positive(buffer), "SelfCollision.buffer", buffer, "finite and above 0 m");
-  require(positive(gain), "SelfCollision.gain", gain, "finite and above 0 1/s");
-  require(nearest >= 1 && nearest <= kMaxRows, "SelfCollision.nearest", nearest,
-          "between 1 and " + std::to_string(kMaxRows));
-}
-
-const char* task_name(const TaskSpec& spec) {
-  constexpr const char* names[] = {"avoidance",        "reach",          "joint_limits",
-                                   "minimum_altitude", "manipulability", "self_collision"};
-  static_assert(std::size(names) == std::variant_size_v<TaskSpec>);
-  const auto* reach = std::get_if<Reach>(&spec);
-  if (reach != nullptr && reach->rows == ReachRows::kPosition) return "reach_position";
-  if (reach != nullptr && reach->rows == ReachRows::kOrientation) return "reach_orientation";
-  return names[spec.index()];
-}
-
-void validate(const TaskSpec& spec) {
-  std::visit([](const auto& task) { task.validate(); }, spec);
-}
 
 void validate(const TaskSpec& spec, const Robot& robot) {
   validate(spec);
