@@ -183,7 +183,7 @@ bool Motion::Impl::fit(Vector3& velocity, Eigen::Matrix3d& covariance) {
       const double weight = patch.weight[at];
       squares += weight * r * r;
       weights += weight;
-      A.selfadjointView<Eigen::Lower>().rankUpdate(row, weight);
+      A.noalias() += (weight * row) * row.transpose();
       b += weight * h * row;
     }
     if (round > 0) {
