@@ -26,6 +26,7 @@ CPP_LAYER_OF = {
     "robot": "robot",
     "pipeline": "stages",
     "safety": "stages",
+    "sight_lines": "stages",
     "joint_history": "controller",
     "freshness": "controller",
     "perception": "controller",
