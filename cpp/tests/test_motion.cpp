@@ -119,8 +119,8 @@ struct PlateInView {
       const Vector3 from = sensor * ago, plate = middle + velocity * ago;
       std::vector<Vector3> points_W;
       for (int zone = 0; zone < kZones; ++zone) {
-        const Vector3 ray(std::tan((zone % 8 - 3.5) * 0.09817),
-                          std::tan((zone / 8 - 3.5) * 0.09817), 1.0);
+        const int column = zone % 8, row = zone / 8;
+        const Vector3 ray(std::tan((column - 3.5) * 0.09817), std::tan((row - 3.5) * 0.09817), 1.0);
         const double range = plate.z() - from.z();
         const Vector3 hit = from + range * ray - plate;
         if (std::abs(hit.x()) > half || std::abs(hit.y()) > half) continue;
@@ -174,6 +174,7 @@ TEST(Motion, WhatWasNotSeenForAWhileHasNoVelocity) {
   Random random(8);
   for (int scan = 0; scan < 4; ++scan) {
     std::vector<Vector3> points;
+    points.reserve(40);
     for (int i = 0; i < 40; ++i)
       points.emplace_back(random.uniform(-0.1, 0.1), random.uniform(-0.1, 0.1), -0.5 * scan / 15.0);
     motion.see(scan / 15.0, points);
@@ -187,6 +188,7 @@ TEST(Motion, ASensorWithOldStampsHidesNothingFromIt) {
   Random random(10);
   for (int scan = 0; scan < 4; ++scan) {
     std::vector<Vector3> points;
+    points.reserve(40);
     for (int i = 0; i < 40; ++i)
       points.emplace_back(random.uniform(-0.1, 0.1), random.uniform(-0.1, 0.1), -0.5 * scan / 15.0);
     motion.see(scan / 15.0, points);
