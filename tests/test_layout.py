@@ -27,6 +27,7 @@ CPP_LAYER_OF = {
     "pipeline": "stages",
     "safety": "stages",
     "task_config": "stages",
+    "sight_lines": "stages",
     "joint_history": "controller",
     "freshness": "controller",
     "perception": "controller",

@@ -2,51 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <vector>
 
 #include "frames.hpp"
 #include "geometry/point_chunk.hpp"
 #include "require.hpp"
+#include "sight_lines.hpp"
 #include "voxel_index.hpp"
 
 namespace proxcgal {
 namespace {
 
-constexpr int kSide = 8;
-constexpr float kNearest = 0.02F;           // [m] along z: nearer than that no zone tells a range
 constexpr std::int64_t kPairsAView = 64;    // that a scan costs whatever there is to look at
 constexpr std::int64_t kPairsATick = 8192;  // (point, scan) that one tick looks at
-
-/// Where the zones of a scan look, as tangents.
-struct Zones {
-  std::array<float, kSide> middle;
-  std::array<float, kSide + 1> border;
-
-  explicit Zones(double field_of_view) {
-    const double pitch = field_of_view / kSide;
-    for (std::size_t i = 0; i < kSide; ++i)
-      middle[i] = static_cast<float>(std::tan((static_cast<double>(i) - 3.5) * pitch));
-    for (std::size_t i = 0; i <= kSide; ++i)
-      border[i] = static_cast<float>(std::tan((static_cast<double>(i) - 4.0) * pitch));
-  }
-  float edge() const { return border[kSide]; }
-  /// The last of ascending `bounds` at or below a tangent, -1 for none.
-  template <std::size_t n>
-  static int below(const std::array<float, n>& bounds, float tangent) {
-    // Tangents are nearly even: the guess is at most a step off.
-    const float share = 0.5F * (tangent - bounds[0]) / -bounds[0];
-    int at =
-        std::clamp(static_cast<int>(share * static_cast<float>(n - 1)), 0, static_cast<int>(n) - 1);
-    while (at >= 0 && bounds[static_cast<std::size_t>(at)] > tangent) --at;
-    while (at + 1 < static_cast<int>(n) && bounds[static_cast<std::size_t>(at + 1)] <= tangent)
-      ++at;
-    return at;
-  }
-};
-
-/// What a scan says of one point.
-enum class Verdict : std::uint8_t { kNothing, kThrough, kThere };
 
 }  // namespace
 
@@ -63,8 +31,7 @@ void MemoryConfig::validate() const {
 
 struct Memory::Impl {
   MemoryConfig config;
-  ViewModel model;
-  Zones zones;
+  detail::SightLines sight;
   detail::VoxelIndex index;
 
   // One row each, side by side; the first `count` are in use.
@@ -93,8 +60,7 @@ struct Memory::Impl {
 
   Impl(const MemoryConfig& c, const ViewModel& m, std::size_t sensors)
       : config(c),
-        model(m),
-        zones(m.field_of_view),
+        sight(m, c.voxel),
         index(c.voxel, c.max_points),
         views(sensors),
         next(sensors, -1) {
@@ -105,63 +71,6 @@ struct Memory::Impl {
     origin.resize(n);
     key.resize(n);
     through.resize(n);
-  }
-
-  /// Noise of a range along z, and half a voxel for what the surface does between two rays [m].
-  float margin(double along_z) const {
-    const double sigma = std::max(model.sigma_floor, model.sigma_ratio * along_z);
-    return static_cast<float>(model.sigmas * sigma + 0.5 * config.voxel);
-  }
-
-  /// Does the ray of a zone pass the voxel of a point as deep as the point is?
-  ///
-  /// A zone is wider than a voxel: what it measures beside a point does not stand for the point.
-  /// If it did, each scan's point would take the place of the last one's, and an arm that passes
-  /// by slowly would drag them along and leave nothing behind.
-  bool passes(const ScanView& view, int zx, int zy, float pz,
-              const detail::VoxelIndex::Key& voxel) const {
-    const Vector3 on_ray_S(zones.middle[static_cast<std::size_t>(zx)] * pz,
-                           zones.middle[static_cast<std::size_t>(zy)] * pz, pz);
-    return index.key(view.T_WS * on_ray_S) == voxel;
-  }
-
-  /// Do the four rays next to a direction end beyond a depth? In the outer half of an outermost
-  /// zone there are no four: there it is that zone's own.
-  bool beyond(const ScanView& view, float tx, float ty, int zx, int zy, float depth) const {
-    const int cx = Zones::below(zones.middle, tx), cy = Zones::below(zones.middle, ty);
-    const bool outside = cx < 0 || cy < 0 || cx >= kSide - 1 || cy >= kSide - 1;
-    if (outside) return view.empty_to[static_cast<std::size_t>(kSide * zy + zx)] > depth;
-    for (const int corner : {0, 1, kSide, kSide + 1}) {
-      const float end = view.empty_to[static_cast<std::size_t>(kSide * cy + cx + corner)];
-      if (!(end > depth)) return false;
-    }
-    return true;
-  }
-
-  /// @param point_S  inside the field of view
-  /// @param voxel    that the point lies in
-  Verdict judge(const ScanView& view, float px, float py, float pz,
-                const detail::VoxelIndex::Key& voxel) const {
-    const float tx = px / pz, ty = py / pz, far = margin(static_cast<double>(pz));
-    const int zx = std::clamp(Zones::below(zones.border, tx), 0, kSide - 1);
-    const int zy = std::clamp(Zones::below(zones.border, ty), 0, kSide - 1);
-    const float seen = view.obstacle[static_cast<std::size_t>(kSide * zy + zx)];
-    if (seen > 0.0F && std::abs(seen - pz) <= far)
-      return passes(view, zx, zy, pz, voxel) ? Verdict::kThere : Verdict::kNothing;
-    if (!beyond(view, tx, ty, zx, zy, pz + far)) return Verdict::kNothing;
-    const float dx = (tx - zones.middle[static_cast<std::size_t>(zx)]) * pz;
-    const float dy = (ty - zones.middle[static_cast<std::size_t>(zy)]) * pz;
-    const auto round_voxel = static_cast<float>(0.5 * std::numbers::sqrt3 * config.voxel);
-    return dx * dx + dy * dy <= round_voxel * round_voxel ? Verdict::kThrough : Verdict::kNothing;
-  }
-
-  Verdict judge(const ScanView& view, const Vector3& point_W) const {
-    const Vector3 point_S = view.T_WS.linear().transpose() * (point_W - view.T_WS.translation());
-    const auto px = static_cast<float>(point_S.x()), py = static_cast<float>(point_S.y()),
-               pz = static_cast<float>(point_S.z());
-    const float wide = zones.edge() * pz;
-    if (!(pz > kNearest && std::abs(px) <= wide && std::abs(py) <= wide)) return Verdict::kNothing;
-    return judge(view, px, py, pz, index.key(point_W));
   }
 
   void write(int row, const RememberedPoint& from, bool was_through, double now) {
@@ -266,9 +175,9 @@ struct Memory::Impl {
     std::array<bool, kZones> was_through;
     int n = 0;
     for (const RememberedPoint& point : points) {
-      const Verdict verdict = judge(now, point.point_W);
-      const bool seen_through = verdict == Verdict::kThrough;
-      if (verdict == Verdict::kThere || (seen_through && config.clear_scans == 1)) continue;
+      const detail::Verdict verdict = sight.judge(now, point.point_W, index);
+      const bool seen_through = verdict == detail::Verdict::kThrough;
+      if (verdict == detail::Verdict::kThere || (seen_through && config.clear_scans == 1)) continue;
       was_through[static_cast<std::size_t>(n)] = seen_through;
       fresh[static_cast<std::size_t>(n++)] = &point;
     }
@@ -316,27 +225,25 @@ struct Memory::Impl {
         px[to] = R(0, 0) * dx + R(0, 1) * dy + R(0, 2) * dz;
         py[to] = R(1, 0) * dx + R(1, 1) * dy + R(1, 2) * dz;
         pz[to] = R(2, 0) * dx + R(2, 1) * dy + R(2, 2) * dz;
-        const float wide = zones.edge() * pz[to];
-        in[to] = static_cast<int>(pz[to] > kNearest) & static_cast<int>(std::abs(px[to]) <= wide) &
-                 static_cast<int>(std::abs(py[to]) <= wide);
+        in[to] = static_cast<int>(sight.in_view(px[to], py[to], pz[to]));
       }
       for (int i = n - 1; i >= 0; --i) {
         const auto to = static_cast<std::size_t>(i);
         if (in[to] == 0) continue;
         const auto at = static_cast<std::size_t>(begin + i);
-        take(begin + i, view, judge(view, px[to], py[to], pz[to], key[at]));
+        take(begin + i, view, sight.judge(view, px[to], py[to], pz[to], index, key[at]));
       }
       left -= n;
       row = begin - 1;
     }
   }
 
-  void take(int row, const ScanView& view, Verdict verdict) {
+  void take(int row, const ScanView& view, detail::Verdict verdict) {
     const auto at = static_cast<std::size_t>(row);
     if (!(view.stamp > stamp[at])) return;  // an older scan says nothing against a newer point
-    if (verdict == Verdict::kThere) {
+    if (verdict == detail::Verdict::kThere) {
       remove(row);
-    } else if (verdict == Verdict::kThrough && view.stamp > through_stamp[at]) {
+    } else if (verdict == detail::Verdict::kThrough && view.stamp > through_stamp[at]) {
       through_stamp[at] = view.stamp;
       if (++through[at] >= config.clear_scans) remove(row);
     }

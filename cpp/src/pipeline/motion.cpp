@@ -13,11 +13,12 @@ namespace {
 
 constexpr int kMostPoints = 160;        // of a patch: bounded work
 constexpr int kRounds = 3;              // of reweighting
-constexpr int kFewest = 14;             // points, for the nine unknowns
+constexpr int kFewest = 6;              // points: what they can't tell of nine unknowns priors do
 constexpr double kFresh = 0.10;         // [s] a patch that was not seen since has no velocity
 constexpr double kLeastBaseline = 0.1;  // [s] between its first and its last scan: three at 15 Hz
 constexpr double kMoved = 0.02;         // [m] of the anchor, from where on it is asked anew
-constexpr double kLeastNoise = 0.003;   // [m] residuals are never believed to be smaller
+constexpr double kNoise = 0.008;        // [m] of a range, as likely before any residual was seen
+constexpr double kNoiseWeight = 10.0;   // residuals that this is worth: few points tell it badly
 constexpr double kFastest = 0.5;        // [m/s] the spread of velocities that is taken for likely
 constexpr double kSteepest = 0.3;       // [-] likely slope against the patch's own plane
 constexpr double kMostCurved = 4.0;     // [1/m] likely half curvature: a body of 0.125 m radius
@@ -25,6 +26,16 @@ constexpr double kOutlier = 2.5;        // standard deviations from where on a p
 
 using Matrix9 = Eigen::Matrix<double, 9, 9>;
 using Vector9 = Eigen::Matrix<double, 9, 1>;
+
+/// By how much a variance that was told by few residuals is to be taken for more, so that a bound
+/// of so many standard deviations is as sure: squared quantile of Student's t over the normal's
+/// (Gaver and Kafadar, A Retrievable Recipe for Inverse t, The American Statistician 38, 1984).
+/// @param free  degrees of freedom, well above 1
+double widened(double deviations, double free) {
+  const double squared = deviations * deviations;
+  if (!(squared > 0.0)) return 1.0;
+  return free * std::expm1(squared * (free - 1.5) / ((free - 1.0) * (free - 1.0))) / squared;
+}
 
 }  // namespace
 
@@ -70,6 +81,7 @@ struct Motion::Impl {
   }
 
   void fill(double time, const Vector3& velocity, double age);
+  Eigen::Matrix3d axes(const Vector3& velocity, const Vector3& mean) const;
   bool fit(Vector3& velocity, Eigen::Matrix3d& covariance);
   Vector3 estimate(double time);
 };
@@ -106,10 +118,36 @@ void Motion::Impl::fill(double time, const Vector3& velocity, double age) {
   }
 }
 
+/// Axes of the patch, its normal first, about its mean, as it would be if it moved so.
+///
+/// Its shape is what is left of the spread once the drift of the middle is taken out: three places
+/// of a small body, one behind the other, would pass for a patch that stands along its way.
+Eigen::Matrix3d Motion::Impl::axes(const Vector3& velocity, const Vector3& mean) const {
+  double middle = 0.0;
+  for (int i = 0; i < patch.n; ++i) middle += patch.time[static_cast<std::size_t>(i)] / patch.n;
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  Vector3 drift = Vector3::Zero();
+  double lasted = 0.0;
+  for (int i = 0; i < patch.n; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const Vector3 d = patch.point[at] - velocity * patch.time[at] - mean;
+    const double t = patch.time[at] - middle;
+    spread += d * d.transpose();
+    drift += t * d;
+    lasted += t * t;
+  }
+  if (lasted > 0.0) spread -= drift * drift.transpose() / lasted;
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> found;
+  found.computeDirect(spread);
+  return found.eigenvectors();
+}
+
 /// A smooth patch h = f(u, w) that moves as a whole, by least squares:
 ///   n'(p - v t) = c0 + c1 u + c2 w + c3 u^2 + c4 u w + c5 w^2,   u, w of p - v t.
 /// Linearised in v, so that a surface that is flat shows its normal velocity only; a weak prior
 /// keeps what cannot be seen at zero.
+/// @param covariance  of the velocity, as wide as Student's t makes it where few points tell the
+///                    noise: `confidence` standard deviations of it are as unlikely as of a normal
 bool Motion::Impl::fit(Vector3& velocity, Eigen::Matrix3d& covariance) {
   const int n = patch.n;
   if (n < kFewest) return false;
@@ -118,17 +156,10 @@ bool Motion::Impl::fit(Vector3& velocity, Eigen::Matrix3d& covariance) {
     const auto at = static_cast<std::size_t>(i);
     mean += (patch.point[at] - velocity * patch.time[at]) / n;
   }
-  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
-  for (int i = 0; i < n; ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    const Vector3 d = patch.point[at] - velocity * patch.time[at] - mean;
-    spread += d * d.transpose();
-  }
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes;
-  axes.computeDirect(spread);
-  const Eigen::Matrix3d R = axes.eigenvectors();  // the normal first
+  const Eigen::Matrix3d R = axes(velocity, mean);
   const Vector3 normal = R.col(0), e_u = R.col(1), e_w = R.col(2);
-  double sigma = 0.01;
+  double sigma = kNoise, free = kNoiseWeight;  // degrees of freedom that sigma rests on
+  double fitted = 9.0;                         // unknowns that the points tell, not the priors
   Vector9 x9 = Vector9::Zero();
   for (int round = 0; round < kRounds; ++round) {
     Matrix9 A = Matrix9::Zero();
@@ -152,31 +183,31 @@ bool Motion::Impl::fit(Vector3& velocity, Eigen::Matrix3d& covariance) {
       const double weight = patch.weight[at];
       squares += weight * r * r;
       weights += weight;
-      A.selfadjointView<Eigen::Lower>().rankUpdate(row, weight);
+      A.noalias() += (weight * row) * row.transpose();
       b += weight * h * row;
     }
-    if (round > 0) sigma = std::max(std::sqrt(squares / std::max(weights - 9.0, 1.0)), kLeastNoise);
-    // The prior is on the velocity itself, not on the step.
-    const double prior = sigma * sigma / (kFastest * kFastest);
-    for (int k = 6; k < 9; ++k) {
-      A(k, k) += prior;
-      b[k] -= prior * velocity[k - 6];
+    if (round > 0) {
+      free = kNoiseWeight + std::max(weights - fitted, 0.0);
+      sigma = std::sqrt((kNoiseWeight * kNoise * kNoise + squares) / free);
     }
+    // The prior is on the velocity itself, not on the step.
     const double noise = sigma * sigma;
-    A(0, 0) += 1e-9;
-    for (int k = 1; k < 3; ++k) A(k, k) += noise / (kSteepest * kSteepest);
-    for (int k = 3; k < 6; ++k) A(k, k) += noise / (kMostCurved * kMostCurved);
+    Vector9 prior;
+    prior << 1e-9, Eigen::Vector2d::Constant(noise / (kSteepest * kSteepest)),
+        Vector3::Constant(noise / (kMostCurved * kMostCurved)),
+        Vector3::Constant(noise / (kFastest * kFastest));
+    A.diagonal() += prior;
+    b.tail<3>() -= prior.tail<3>().cwiseProduct(velocity);
     const Eigen::LDLT<Matrix9> solved(A);
     if (solved.info() != Eigen::Success) return false;
     x9 = solved.solve(b);
+    const Matrix9 inverse = solved.solve(Matrix9::Identity());
+    fitted = 9.0 - inverse.diagonal().dot(prior);
     velocity += x9.tail<3>();
     if (!velocity.allFinite() || velocity.norm() > 10.0) return false;
-    if (round == kRounds - 1) {
-      const Eigen::Matrix<double, 9, 3> columns =
-          solved.solve(Eigen::Matrix<double, 9, 9>::Identity().rightCols<3>());
-      covariance = sigma * sigma * columns.bottomRows<3>();
-    }
+    covariance = noise * inverse.bottomRightCorner<3, 3>();
   }
+  covariance *= widened(config.confidence, free);
   return true;
 }
 
