@@ -129,7 +129,8 @@ void Caution::slow_into_unseen(double time, const Posture& posture, const Percep
     const Pose T_WS = posture.T_WL[static_cast<std::size_t>(link)] * perception.T_LS(sensor);
     Jacobian6 J;
     robot_.jacobian(posture, link, T_WS.translation(), J);
-    const double share = to > from ? std::clamp((to - blind) / (to - from), 0.0, 1.0) : 0.0;
+    double share = to > from ? std::clamp((to - blind) / (to - from), 0.0, 1.0) : 0.0;
+    if (std::isinf(to)) share = 1.0;  // it never comes to HOLD
     double wanted = 0.0;
     for (const Vector3& view_S : view_S_) {
       const JointVector row = -(J.topRows<3>().transpose() * (T_WS.linear() * view_S));

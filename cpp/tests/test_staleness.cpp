@@ -183,6 +183,40 @@ TEST(Controller, MotionIntoWhatASilentSensorSawIsHeld) {
   EXPECT_TRUE(held);
 }
 
+TEST(Controller, WhereNoAgeHoldsMotionIntoWhatASilentSensorSawIsSlowedStill) {
+  const auto robot = test::arm();
+  const Skin skin = test::ring(10);
+  ControllerConfig config;
+  config.monitor.hold_after = kInfinity;
+  config.monitor.blind_speed = 0.02;
+  Controller controller(robot, skin, config);
+  Random random(25);
+  JointVector q = bent();
+  Posture posture = robot->make_posture();
+  robot->update(q, posture);
+  const int link = robot->link_row("link3");
+  Pose goal = posture.T_WT;
+  goal.translation() +=
+      0.5 * (posture.T_WL[static_cast<std::size_t>(link)] * skin.mounts[0].T_LS).linear().col(2);
+  double fastest_seen = 0.0, fastest_blind = 0.0;
+  for (int i = 0; i < 100; ++i) {
+    auto batch = scans(random, 10, static_cast<std::uint32_t>(i), 0.01 * i, 1.0);
+    if (i >= 40) batch.erase(batch.begin());
+    const TickOutput& out = controller.tick(0.01 * i, q, batch, goal);
+    robot->update(q, posture);
+    const Pose T_WS = posture.T_WL[static_cast<std::size_t>(link)] * skin.mounts[0].T_LS;
+    Jacobian6 J;
+    robot->jacobian(posture, link, T_WS.translation(), J);
+    const double into = T_WS.linear().col(2).dot(J.topRows<3>() * out.qd);
+    if (i < 40) fastest_seen = std::max(fastest_seen, into);
+    if (i >= 80) fastest_blind = std::max(fastest_blind, into);
+    EXPECT_NE(out.mode, Mode::kHold);
+    q += 0.01 * out.qd;
+  }
+  EXPECT_GT(fastest_seen, 0.03);
+  EXPECT_LE(fastest_blind, 0.02 + 1e-9);
+}
+
 TEST(Controller, ARepeatedOrOlderScanIsRefused) {
   const auto robot = test::arm();
   Controller controller(robot, test::ring(), ControllerConfig{});
