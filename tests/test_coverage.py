@@ -1,5 +1,6 @@
 """Coverage: what the sensors have in view, against what they measure and against geometry."""
 
+import igl
 import numpy as np
 import pytest
 
@@ -7,6 +8,7 @@ import proxcgal as px
 from proxcgal.sim.blind import blind_volume, distances, last_seen, volume_within
 from proxcgal.sim.coverage import Coverage, coverage_of, sightings
 from proxcgal.sim.eyes import Eyes
+from proxcgal.sim.frames import inverse, placed
 from proxcgal.sim.scenario import load_scenario
 from proxcgal.sim.setup import Setup
 from proxcgal.sim.source import SimulatedSource
@@ -87,6 +89,17 @@ def test_the_volume_is_all_within_reach_of_the_arm(ur10e: px.Robot) -> None:
     assert (far <= 0.2).all()
     nearest = [px.closest_pair(ur10e, q, points_W[row : row + 1]).distance for row in (0, 99, 400)]
     assert far[[0, 99, 400]] == pytest.approx(nearest, abs=1e-9)
+
+
+def test_the_arms_own_inside_is_no_part_of_the_volume(ur10e: px.Robot) -> None:
+    q = np.array(load_scenario("side_plane").q0)
+    points_W = volume_within(ur10e, q, reach=0.1)
+    points_W = points_W[distances(ur10e, q, points_W) > 1e-9]  # on a surface is neither
+    for name, T_WL in zip(ur10e.link_names, ur10e.link_poses(q), strict=True):
+        vertices_L, triangles = ur10e.mesh(name)
+        points_L = placed(inverse(T_WL), points_W)
+        around = igl.winding_number(vertices_L, triangles.astype(np.int64), points_L)
+        assert (np.abs(around) <= 0.5).all()
 
 
 def test_a_path_sees_more_than_its_end_and_the_share_never_rises_with_time(

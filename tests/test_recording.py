@@ -341,6 +341,19 @@ def test_a_recording_that_never_began_leaves_no_file(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_recording_that_never_began_leaves_an_older_one_of_that_name(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "a.mcap") as recorder:
+        recorder.start(SETTINGS)
+        recorder.write(made_tick(0))
+    older = (tmp_path / "a.mcap").read_bytes()
+    with Recorder(tmp_path / "a.mcap"):
+        pass
+    assert (tmp_path / "a.mcap").read_bytes() == older
+    with Recorder(tmp_path / "a.mcap") as recorder:
+        recorder.start(SETTINGS)
+    assert read_recording(tmp_path / "a.mcap").ticks == ()
+
+
 @pytest.mark.parametrize("content", [b"", b"hello", b"\x89MCAX0\r\n" + bytes(100)])
 def test_what_is_no_recording_is_refused_with_what_was_expected(
     tmp_path: Path, content: bytes

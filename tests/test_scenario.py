@@ -225,12 +225,34 @@ def test_overrides_take_toml_values_bare_strings_and_array_places() -> None:
         ("q0.9=1", "q0 has the entries 0 to 5, not 9"),
         ("q0.²=1", "q0 has the entries 0 to 5, not ²"),
         ("seed.deeper=1", "seed is no table"),
+        ("seed=1\nduration=3", "must have one value, and no lines after it"),
+        ("q0=" + 100 * "[" + 100 * "]", "must not be nested more than 64 deep"),
+        ("q0=" + 3000 * "[", "must not be nested more than 64 deep"),
+        (3000 * "a." + "a=1", "must not be nested more than 64 deep"),
     ],
 )
 def test_a_bad_override_is_told_as_it_was_given(override: str, message: str) -> None:
     with pytest.raises(ConfigError, match=message) as error:
         load_scenario("front_plane", ["seed=1", override])
-    assert override in str(error.value)
+    assert repr(override) in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "text", ["q0 = " + 3000 * "[", "q0 = " + 99 * "[" + 99 * "]", 2000 * "a." + "a = 1"]
+)
+def test_a_file_that_is_nested_without_end_is_told(text: str) -> None:
+    assert told(text) == ["x.toml: must not be nested more than 64 deep"]
+
+
+def test_an_override_may_have_a_value_of_several_lines() -> None:
+    assert load_scenario("front_plane", ["obstacle.0.size=[0.1,\n2, 2]"]).obstacles[0].size[1] == 2
+
+
+def test_an_override_is_told_as_one_however_its_key_is_written() -> None:
+    (line,) = told(MINIMAL, "controller . d_min = -1")
+    assert line.startswith("x.toml: override controller.d_min = -1: must be")
+    (line,) = told(MINIMAL + "\n[[obstacle]]\nsize=[1,1,1]\nposition=[0,0,0]", "obstacle.00.size=1")
+    assert line.startswith("x.toml: override obstacle.0.size = 1: ")
 
 
 def test_scenarios_cannot_be_changed_once_loaded() -> None:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 import proxcgal as px
 from proxcgal import _core
+from proxcgal.sim.decisive import half_box
 from proxcgal.sim.frames import inverse, placed, pose
 from proxcgal.sim.recording import Recorder, read_recording
 from proxcgal.sim.scenario import load_scenario
@@ -207,3 +208,10 @@ def test_what_is_wrong_with_an_obstacle_is_told(change: str, told: str) -> None:
 def test_a_pose_puts_roll_first() -> None:
     T = pose((1.0, 2.0, 3.0), (0.3, -0.4, 0.5))
     np.testing.assert_allclose(inverse(T) @ T, np.eye(4), atol=1e-15)
+
+
+@solids
+def test_the_box_that_bounds_true_distances_holds_all_that_stands_for_a_solid(solid: Solid) -> None:
+    vertices_O, _ = solid.core()
+    assert (np.abs(vertices_O) + solid.rounding <= half_box(solid)).all()
+    assert half_box(solid) == pytest.approx(solid.extent, rel=2e-3)

@@ -7,6 +7,7 @@ import pytest
 
 import proxcgal as px
 from proxcgal.sim.scenario import Scenario, load_scenario
+from proxcgal.sim.scenario_keys import Fault
 from proxcgal.sim.snapshot import Snapshot, take_snapshot
 from proxcgal.study.sweep_inputs import SCENARIOS
 
@@ -73,3 +74,9 @@ def test_the_built_in_scenes_have_the_papers_clouds(name: str) -> None:
     assert sizes[0] > 1500
     assert sizes[1] == pytest.approx(600, rel=0.1)
     assert sizes[2] == pytest.approx(200, rel=0.1)
+
+
+def test_sensors_that_a_fault_moves_stand_where_they_should(scenario: Scenario) -> None:
+    moved = Fault.model_validate({"kind": "mount_offset", "value": 0.1, "sensor": "all"})
+    taken = take_snapshot(scenario.model_copy(update={"faults": (moved,)}))
+    np.testing.assert_array_equal(taken.points_W, take_snapshot(scenario).points_W)

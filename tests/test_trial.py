@@ -1,16 +1,23 @@
 """One run: the same seed gives the same bits, faults act, replays repeat, the arm backs away."""
 
+import errno
+import functools
 import itertools
+import os
 import statistics
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from mcap.writer import Writer
 from PIL import Image
 
 import proxcgal as px
+from proxcgal.apps.moving import _draw
+from proxcgal.apps.results import warn_of_stopped
 from proxcgal.sim.faults import FaultInjector
 from proxcgal.sim.pictures import animate, snapshots
 from proxcgal.sim.ranges import NO_TARGET, VALID
@@ -22,6 +29,7 @@ from proxcgal.sim.setup import Setup
 from proxcgal.sim.ticks import TickInput
 from proxcgal.sim.trial import TrialLog, first_difference, recompute, run_trial
 from proxcgal.sim.trial_log import final_ticks
+from proxcgal.study.trials import simulate
 
 SHORT = ["duration=1.0"]
 NAMES = [f"s{row}" for row in range(4)]
@@ -186,6 +194,35 @@ def test_a_full_disk_changes_no_command_and_is_told(ur10e: px.Robot) -> None:
         log = run_trial(scenario, "wb", robot=ur10e, recorder=recorder)
     assert log.recording_failure is not None
     assert same(log, run_trial(scenario, "wb", robot=ur10e))
+
+
+def test_a_recording_that_could_not_be_closed_is_told_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(_: Writer) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(Writer, "finish", full)
+    scenario = load_scenario("front_plane", ["duration=0.05"])
+    told = functools.partial(simulate, scenario, "wb", 0, lambda _: None)
+    assert "No space left" in (told(recording=tmp_path / "a.mcap").recording_failure or "")
+    trial = SimpleNamespace(scenario=scenario, controller="wb", seed=0)
+    assert "No space left" in _draw([trial], tmp_path, lambda _: None)  # type: ignore[list-item]
+    log = told(recording=tmp_path / "a.mcap")
+    with pytest.warns(RuntimeWarning, match="No space left"):
+        warn_of_stopped([log])
+
+
+def test_what_held_an_arm_is_asked_where_it_really_is() -> None:
+    fault = 'fault=[{kind = "joints_nan", from = 0.02}, {kind = "clock_jump", value = 5.0}]'
+    short = ["duration=0.04", "simulation.known_spacing=0.1", 'initial=["free"]']
+    (start,) = load_scenario("joint_free", short).starts()  # type: ignore[attr-defined]
+    (faulty,) = load_scenario("joint_free", [*short, fault]).starts()  # type: ignore[attr-defined]
+    plain, log = (run_trial(s, "wb_known", without_truth=True) for s in (start, faulty))
+    assert plain.ending is not None
+    assert log.ending is not None
+    assert "nan" not in log.ending.reason
+    assert "m and" in log.ending.reason
 
 
 def test_recording_does_not_change_the_run(ur10e: px.Robot, recording: Recording) -> None:

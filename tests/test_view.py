@@ -121,6 +121,7 @@ def test_an_arm_whose_joint_state_is_no_number_is_drawn_where_it_is(front: Scena
     moment = live.moment()
     assert np.isfinite(moment.links_W).all()
     assert moment.mode == STOP
+    assert np.isfinite(live.q).all()  # another trial begins there
 
 
 def test_nothing_that_a_page_says_leads_out_of_a_stop(cell: Scenario) -> None:

@@ -9,7 +9,6 @@ import re
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from importlib.resources import files
 from pathlib import Path
@@ -21,7 +20,7 @@ import pytest
 
 from documented import rows_of
 from proxcgal.apps.walkthrough import lines_of
-from proxcgal.errors import ConfigError, RecordingError
+from proxcgal.errors import ConfigError, RecordingError, SimulationError
 from proxcgal.models.builtin import ga_ol
 from proxcgal.sim.physics import Physics
 from proxcgal.sim.scenario import load_scenario, parse_scenario
@@ -34,7 +33,7 @@ from proxcgal.sim.walk.playback import check_start, play
 from proxcgal.sim.walk.poses import PoseRecorder, read_poses
 from proxcgal.sim.walk.run import WalkResult, run_walk
 from proxcgal.sim.walk.setup import PERIOD, WalkSetup
-from proxcgal.sim.walk.stops import STRETCHED, worst_stops
+from proxcgal.sim.walk.stops import STRETCHED, not_worst, worst_stops
 from proxcgal.sim.walk.taught import TaughtPath, clean, to_csv, to_trajectory, tool_positions
 from proxcgal.sim.walk.teach import REACHED, teach
 from proxcgal.sim.walk.wish import Wish
@@ -188,28 +187,29 @@ def test_exports_hold_the_path(short: WalkSetup, path: TaughtPath) -> None:
 
 
 _TEACH = """
-import sys
+import os, signal, sys
 from proxcgal.sim.scenario import load_scenario
 from proxcgal.sim.walk.poses import PoseRecorder
 from proxcgal.sim.walk.setup import WalkSetup
 from proxcgal.sim.walk.teach import teach
 setup = WalkSetup.of(load_scenario("walkthrough_teach"))
-with PoseRecorder(sys.argv[1], {"seed": "0"}) as recorder:
+class Killed(PoseRecorder):
+    def write(self, *pose):
+        super().write(*pose)
+        if self._count == 300:
+            os.kill(os.getpid(), signal.SIGKILL)
+with Killed(sys.argv[1], {"seed": "0"}) as recorder:
     teach(setup, seed=0, recorder=recorder)
 """
 
 
 def test_every_pose_written_before_a_kill_can_be_read(tmp_path: Path) -> None:
     file = tmp_path / "taught.mcap"
-    process = subprocess.Popen([sys.executable, "-c", _TEACH, str(file)])
-    while not file.exists() or file.stat().st_size < 200_000:
-        assert process.poll() is None
-        time.sleep(0.02)
-    os.kill(process.pid, signal.SIGKILL)
-    process.wait()
+    done = subprocess.run([sys.executable, "-c", _TEACH, str(file)], check=False)
+    assert done.returncode == -signal.SIGKILL
     poses = read_poses(file)
     assert poses.damage is not None
-    assert len(poses.time) >= 100
+    assert len(poses.time) == 300
     np.testing.assert_allclose(np.diff(poses.time), PERIOD, atol=1e-12)
 
 
@@ -282,6 +282,45 @@ def test_weaker_brakes_stop_later(short: WalkSetup) -> None:
     assert times[1] <= 0.35
 
 
+def test_stops_tell_the_brakes_that_they_were_made_with() -> None:
+    setup = setup_of("walkthrough_overspeed", "arm.brake_scale=0.8")
+    brakes = [stop.brake_scale for stop in worst_stops(setup)]
+    assert brakes == pytest.approx([0.56, 0.8, 1.04])
+
+
+def test_an_arm_that_is_not_stretched_level_in_that_posture_is_not_looked_at_in_it(
+    tmp_path: Path,
+) -> None:
+    text = Path(str(files("proxcgal.models") / "ga_ol.toml")).read_text()
+    other = tmp_path / "other.toml"
+    for change, told in (
+        (("range = [-1.05, 1.92]", "range = [-1.05, 1.5]"), "beyond the limits of joint_2"),
+        (("axis = [0.0, 1.0, 0.0]", "axis = [0.0, 0.0, 1.0]"), "joint_2 does not bring the tool"),
+    ):
+        other.write_text(text.replace(*change, 1).replace('"ga_ol"', '"other"'))
+        setup = setup_of("walkthrough_overspeed", f"robot={other}")
+        assert worst_stops(setup) == []
+        assert told in (not_worst(setup) or "")
+    assert not_worst(setup_of("walkthrough_overspeed")) is None
+
+
+def test_nobody_pulls_in_a_cycle_that_is_told_no_force() -> None:
+    arms = [Physics(ga_ol(), np.array(STRETCHED)) for _ in range(2)]
+    for arm, force in zip(arms, (None, np.zeros(6)), strict=True):
+        arm.step(np.zeros(6), True, np.array([0.0, 200.0, 0.0, 0.0, 0.0, 0.0]))
+        for _ in range(5):
+            arm.step(np.zeros(6), True, force)
+    np.testing.assert_array_equal(arms[0].qd, arms[1].qd)
+
+
+def test_an_arm_is_told_of_its_own_warnings_where_another_was_made_after_it() -> None:
+    first, second = (Physics(ga_ol(), np.array(STRETCHED)) for _ in range(2))
+    first.q[:] = np.nan
+    with pytest.raises(SimulationError, match="MuJoCo warned"):
+        first.step(np.zeros(6), True)
+    second.step(np.zeros(6), True)
+
+
 def test_the_preset_of_the_hand_guiding_rules_takes_longer(short: WalkSetup) -> None:
     slow = teach(setup_of("walkthrough_teach", *SHORT).slow(), seed=0)
     assert slow.trips == []
@@ -342,6 +381,8 @@ def test_ratings_of_a_users_own_are_read_and_what_is_wrong_is_told(tmp_path: Pat
     table = tmp_path / "ratings.csv"
     table.write_text("safety,stress\n9,1\n8,\n10,2.5\n")
     assert read_ratings(table) == {"safety": [9.0, 8.0, 10.0], "stress": [1.0, 2.5]}
+    table.write_text("safety,stress\n9,1\n", encoding="utf-8-sig")  # as spreadsheets write it
+    assert read_ratings(table) == {"safety": [9.0], "stress": [1.0]}
     table.write_text("safety,stress\n11,x\n")
     with pytest.raises(ConfigError) as caught:
         read_ratings(table)
@@ -398,6 +439,14 @@ def test_a_run_refuses_what_a_walkthrough_has_no_use_or_no_time_for(
         assert answer.code == 2
         assert told in answer.err
     assert not Path("out").exists()
+
+
+def test_what_is_refused_leaves_the_files_of_an_older_run(call: Callable[..., Any]) -> None:
+    older = Path("out/walkthrough_teach/taught.mcap")
+    older.parent.mkdir(parents=True)
+    older.write_bytes(b"older")
+    assert call("run", "walkthrough_teach", "--set", "duration=3", "--quiet").code == 2
+    assert older.read_bytes() == b"older"
 
 
 def test_an_arm_of_ones_own_runs_or_is_refused_before_anything_is_written(

@@ -94,7 +94,8 @@ class JointPursuit:
 
         def judge() -> None:
             try:
-                active.ending = concluded(setup, ending, last, points_W)
+                given = last.given
+                active.ending = concluded(setup, ending, last.result, given.q, points_W, given.time)
             except ProxError:  # then without what held it
                 active.ending = ending
 

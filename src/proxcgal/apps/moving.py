@@ -58,7 +58,9 @@ def _draw(trials: Sequence[Trial], folder: Path, report: Report) -> str:
                 def part(share: float, done: int = row) -> None:
                     report((done + share) / steps)
 
-                simulate(trial.scenario, trial.controller, trial.seed, part, recording=path)
+                log = simulate(trial.scenario, trial.controller, trial.seed, part, recording=path)
+                if log.recording_failure:
+                    return f"no {MOVING}: {log.recording_failure}"
                 recordings.append(read_recording(path))
             motion_picture(recordings, Path(half) / MOVING, Path(half) / STILL)
         except ProxError as error:

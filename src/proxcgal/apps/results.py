@@ -237,10 +237,15 @@ def _simulate(pool: Pool, trials: Sequence[tuple[Plan, str]], quiet: bool) -> li
             )
 
         logs: list[TrialLog] = pool.run(jobs, progress.shares, done)
+    warn_of_stopped(logs)
+    return logs
+
+
+def warn_of_stopped(logs: Sequence[TrialLog]) -> None:
+    """Says which recordings stopped early: where they were made, a worker kept quiet."""
     for log in logs:
         if log.recording_failure:
-            warnings.warn(log.recording_failure, RuntimeWarning, stacklevel=2)
-    return logs
+            warnings.warn(log.recording_failure, RuntimeWarning, stacklevel=3)
 
 
 def _draw(

@@ -97,6 +97,7 @@ def _recording(folder: Path, start: JointScenario, controller: str) -> Path:
 def _rows(
     jobs: Sequence[tuple[JointScenario, str]], folder: Path, workers: int | None, quiet: bool
 ) -> list[dict[str, Any]]:
+    from proxcgal.apps.results import warn_of_stopped
     from proxcgal.study.joint_rows import numbers_of
     from proxcgal.study.pool import Pool, default_workers
     from proxcgal.study.trials import robot_of, simulate
@@ -118,6 +119,7 @@ def _rows(
             progress.finished(f"{start.name} {start.initial[0]} {name}: {reason}")
 
         logs: list[TrialLog] = pool.run(calls, progress.shares, done)
+    warn_of_stopped(logs)
     rows = []
     for (start, name), log in zip(jobs, logs, strict=True):
         levels = start.controller.levels

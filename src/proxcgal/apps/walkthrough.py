@@ -31,6 +31,7 @@ def run_walkthrough(
     from proxcgal.apps.results import ready, remove_empty
     from proxcgal.sim.walk.run import run_walk
     from proxcgal.sim.walk.setup import WalkSetup
+    from proxcgal.sim.walk.teach import check_duration
     from proxcgal.study.figures import png
     from proxcgal.study.ratings import read_ratings
     from proxcgal.study.walk_figures import ratings_figure
@@ -38,6 +39,7 @@ def run_walkthrough(
     ratings = read_ratings(Path(scenario.ratings)) if scenario.ratings else {}
     announce(f"setting up {scenario.name}", quiet=quiet)
     setup = WalkSetup.of(scenario)
+    check_duration(scenario)  # before the files of an older run are removed
     told = setup.told()
     print("\n".join(told))
     made = ready([folder])
@@ -138,6 +140,7 @@ def lines_of(summary: dict[str, Any]) -> list[str]:
             for s in summary["stops"]
         ]  # fmt: skip
         found.append(aligned([head, ("", "[%]", "[s]", "[m]"), *rows], left=1, heads=2))
+    found += [summary["stops_note"]] if summary.get("stops_note") else []
     return found
 
 

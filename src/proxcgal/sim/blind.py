@@ -50,7 +50,8 @@ def volume_within(robot: Robot, q: Array, reach: float = REACH_M) -> Array:
     axes = [np.arange(a, b, _SPACING_M) for a, b in zip(low, high, strict=True)]
     points_W = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     distance = distances(robot, q, points_W)
-    return points_W[(distance > 0.0) & (distance <= reach)]
+    near_W = points_W[(distance > 0.0) & (distance <= reach)]
+    return near_W[_core.signed_distance(robot, q, near_W).distance > 0.0]
 
 
 def distances(robot: Robot, q: Array, points_W: Array) -> Array:

@@ -70,6 +70,15 @@ def decisive_truth(
     return DecisiveTruth(apart.distance, link, own.distance)
 
 
+def half_box(solid: Solid) -> Array:
+    """(3,) half edge lengths of the box round what stands for a solid [m].
+
+    A cylinder's prism reaches a little beyond the cylinder.
+    """
+    vertices_O, _ = solid.core()
+    return np.asarray(np.abs(vertices_O).max(axis=0) + solid.rounding)
+
+
 class _Pairs:
     """Surfaces that may come near one another, and what is known of their distances."""
 
@@ -92,7 +101,7 @@ class _Pairs:
         self._sweeps.append(self._surfaces.sweep(np.full(len(T_AB), link), T_AB))
         at_least = np.zeros(len(T_AB))
         if solid is not None:  # from the box round the solid to the ball round the link
-            outside = np.maximum(np.abs(self._sweeps[-1][:, :3]) - solid.extent, 0.0)
+            outside = np.maximum(np.abs(self._sweeps[-1][:, :3]) - half_box(solid), 0.0)
             far = np.sqrt(np.einsum("ni,ni->n", outside, outside))
             at_least = np.maximum(far - self._surfaces.radii[link], 0.0)
         self._at_least = np.vstack([self._at_least, at_least])

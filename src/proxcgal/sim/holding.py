@@ -12,7 +12,7 @@ from proxcgal.sim.arms import tool_jacobian
 from proxcgal.sim.finish import Ending, Holding, pose_errors
 from proxcgal.sim.frames import inverse
 from proxcgal.sim.setup import Setup
-from proxcgal.sim.ticks import Tick, TickResult
+from proxcgal.sim.ticks import TickResult
 
 Array = NDArray[np.float64]
 
@@ -59,16 +59,26 @@ def what_holds(setup: Setup, q: Array, points_W: Array, last: TickResult, time: 
     return replace(found, link=setup.robot.tool)
 
 
-def concluded(setup: Setup, ending: Ending, last: Tick, points_W: Array) -> Ending:
-    """The ending with what held the arm and how far it still was, where it did not succeed."""
+def concluded(
+    setup: Setup, ending: Ending, last: TickResult, q: Array, points_W: Array, time: float
+) -> Ending:
+    """The ending with what held the arm and how far it still was, where it did not succeed.
+
+    Args:
+        setup: of the run.
+        ending: without what held the arm.
+        last: of the run's ticks.
+        q: (n_q,) where the arm really stands, whatever a fault told the controller.
+        points_W: (n, 3) what the controller was given, or saw, last [m].
+        time: of the scene, at that tick [s].
+    """
     if ending.outcome == "succeeded":
         return ending
-    q, time = last.given.q, last.given.time
-    holding = what_holds(setup, q, points_W, last.result, time)
+    holding = what_holds(setup, q, points_W, last, time)
     metres, radians = pose_errors(np.asarray(setup.robot.tool_pose(q)), setup.goal)
     words = [f"{holding}", f"{ending.reason}, {metres:.3f} m and {radians:.3f} rad remain"]
-    if last.result.mode >= _HELD:
-        found = ", ".join(sorted({finding.reason for finding in last.result.findings}))
+    if last.mode >= _HELD:
+        found = ", ".join(sorted({finding.reason for finding in last.findings}))
         words.insert(1, f"the monitor holds the arm: {found or 'it is not clear yet'}")
     return replace(ending, reason="; ".join(words), holding=holding)
 

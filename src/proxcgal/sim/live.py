@@ -105,7 +105,7 @@ class LiveTrial:
     @property
     def q(self) -> Array:
         """(n_q,) where the arm is."""
-        return self.setup.q0 if self._last is None else self._last[0].q
+        return self._source.q
 
     @property
     def stopped(self) -> bool:

@@ -208,10 +208,12 @@ class Physics:
             self._off_for += self._period
             data.qfrc_applied[:] = 0.0
             self._close_brakes()
+        data.xfrc_applied[self._body] = 0.0  # nobody pulls, unless
         if force is not None:
             data.xfrc_applied[self._body, :3] = force[:3]
             arm = data.site_xpos[self._tool] - data.xipos[self._body]
             data.xfrc_applied[self._body, 3:] = force[3:] + _cross(arm, force)
+        mujoco.set_mju_user_warning(self._warnings.append)  # one for all: another arm may have it
         mujoco.mj_step2(model, data)
         mujoco.mj_step1(model, data)
         if self._warnings:

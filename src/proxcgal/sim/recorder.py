@@ -59,7 +59,9 @@ class Recorder(Closing):
     """Writes one run. A full disk stops the recording, with a warning, but never the run."""
 
     def __init__(self, path: str | Path, ticks: RecordedTicks = "all") -> None:
-        """Opens the file at once, so that a bad place is told before anything is computed.
+        """Tries the place at once, so that a bad one is told before anything is computed.
+
+        What an older file of that name holds stays until the run starts.
 
         Args:
             path: of the file.
@@ -74,14 +76,11 @@ class Recorder(Closing):
         self.started = False
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._stream = _Checked(self.path.open("wb"))
+            self._is_new = not self.path.exists()
+            self._stream = _Checked(self.path.open("ab"))
         except OSError as error:
             reason = error.strerror or error
             raise ConfigError(f"recording {self.path}: cannot be written: {reason}") from None
-        self._writer = Writer(
-            cast("IO[bytes]", self._stream), use_chunking=False, compression=CompressionType.NONE,
-            index_types=IndexType.ALL, enable_data_crcs=True,
-        )  # fmt: skip
         self._channels: dict[str, int] = {}
         self._count = 0
 
@@ -130,17 +129,23 @@ class Recorder(Closing):
                 self._fail(error)
 
     def close(self) -> None:
-        """Writes the index and closes the file; one that nothing was written to is removed."""
+        """Writes the index and closes the file; a new one of a run that never began is removed."""
         try:
             if self.started and self.failure is None:
                 self._writer.finish()  # type: ignore[no-untyped-call]
             self._stream.close()
         except OSError as error:
             self._fail(error)
-        if not self.started:
+        if self._is_new and not self.started:
             self.path.unlink(missing_ok=True)
 
     def _start(self, settings: Settings) -> None:
+        self._stream.close()
+        self._stream = _Checked(self.path.open("wb"))
+        self._writer = Writer(
+            cast("IO[bytes]", self._stream), use_chunking=False, compression=CompressionType.NONE,
+            index_types=IndexType.ALL, enable_data_crcs=True,
+        )  # fmt: skip
         self._writer.start(PROFILE, f"proxcgal {settings.versions.get('proxcgal', '')}")
         for topic, schema in {TICKS: _TICK_SCHEMA, **foxglove.TOPICS}.items():
             number = self._writer.register_schema(

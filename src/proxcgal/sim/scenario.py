@@ -212,14 +212,12 @@ def change_scenario(scenario: Scenario, origin: str, overrides: Sequence[str]) -
 
 
 def _checked(table: dict[str, Any], origin: str, overrides: Sequence[str]) -> Scenario:
-    for assignment in overrides:
-        toml.override(table, assignment)
+    keys = [toml.override(table, assignment) for assignment in overrides]
     kind = table.get("kind", "static")
     model = kinds().get(kind, Scenario) if isinstance(kind, str) else Scenario
     try:
         return model.model_validate(_tuples(table))
     except ValidationError as error:
-        keys = [assignment.partition("=")[0].strip() for assignment in overrides]
         raise ConfigError("\n".join(lines(model, error, origin, keys))) from None
 
 

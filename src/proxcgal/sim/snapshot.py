@@ -55,7 +55,9 @@ def take_snapshot(scenario: Scenario, scans: int = 1) -> Snapshot:
     """
     simulation = scenario.simulation.model_copy(update={"stagger": False})
     long_enough = max(scenario.duration, (scans + 1) / simulation.sensor_hz)
-    changed: dict[str, Any] = {"simulation": simulation, "duration": long_enough}
+    changed: dict[str, Any] = {
+        "simulation": simulation, "duration": long_enough, "faults": (),
+    }  # fmt: skip
     setup = Setup.of(scenario.model_copy(update=changed))
     source = SimulatedSource(setup, World(setup.robot, setup.scene), scenario.seed)
     law = setup.make_controller("wb")

@@ -6,13 +6,15 @@ import json
 import math
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from proxcgal.errors import ConfigError
 
 Table = dict[str, Any]
 
+_DEEPEST = 64  # levels of tables and arrays: at some hundreds, what reads them would end
+_TOO_DEEP = f"must not be nested more than {_DEEPEST} deep"
 _BARE = re.compile(r"[A-Za-z0-9_-]+")  # a key that needs no quotes
 
 
@@ -20,31 +22,44 @@ def parse(text: str, origin: str) -> Table:
     """The tables of a TOML text.
 
     Raises:
-        ConfigError: it is not TOML; the message names `origin` and the line.
+        ConfigError: it is not TOML; the message names `origin` and the line. It is nested too
+            deeply.
     """
     try:
-        return tomllib.loads(text)
+        return _loaded(text)
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{origin}: not TOML: {error}") from None
+    except RecursionError:
+        raise ConfigError(f"{origin}: {_TOO_DEEP}") from None
 
 
-def override(table: Table, assignment: str) -> None:
+def override(table: Table, assignment: str) -> str:
     """Sets one key of nested tables from `key.sub=value`, in place.
 
     The value has TOML syntax; what is not a TOML value is taken as a string, so that
     `robot=panda` needs no quotes. A number steps into an array: `obstacle.0.size=[1, 1, 1]`.
 
+    Returns:
+        The dotted key that was set, without spaces.
+
     Raises:
-        ConfigError: no `=`, an empty key, or a step into what is no table or array.
+        ConfigError: no `=`, an empty key, more than a value, nested too deeply, or a step into what
+            is no table or array.
     """
     key, equals, text = assignment.partition("=")
     steps = [step.strip() for step in key.split(".")]
     if not equals or not all(steps):
         raise ConfigError(f"override {assignment!r}: must have the form key.sub=value")
+    if len(steps) > _DEEPEST:
+        raise ConfigError(f"override {assignment!r}: {_TOO_DEEP}")
     try:
-        value = tomllib.loads(f"value = {text}")["value"]
+        value, *more = _loaded(f"value = {text}").values()
     except tomllib.TOMLDecodeError:
-        value = text.strip()
+        value, more = text.strip(), []
+    except RecursionError:
+        raise ConfigError(f"override {assignment!r}: {_TOO_DEEP}") from None
+    if more:
+        raise ConfigError(f"override {assignment!r}: must have one value, and no lines after it")
     place: Any = table
     for depth, step in enumerate(steps):
         last = depth == len(steps) - 1
@@ -54,6 +69,7 @@ def override(table: Table, assignment: str) -> None:
                     f"override {assignment!r}: {'.'.join(steps[:depth])} has the entries "
                     f"0 to {len(place) - 1}, not {step}"
                 )
+            steps[depth] = str(int(step))
             if last:
                 place[int(step)] = value
             else:
@@ -65,6 +81,24 @@ def override(table: Table, assignment: str) -> None:
                 place = place.setdefault(step, {})
         else:
             raise ConfigError(f"override {assignment!r}: {'.'.join(steps[:depth])} is no table")
+    return ".".join(steps)
+
+
+def _loaded(text: str) -> Table:
+    """Raises: RecursionError: deeper than `_DEEPEST`, by brackets or by dotted keys."""
+    table = tomllib.loads(text)
+    level: list[Any] = [table]
+    for _ in range(_DEEPEST + 1):
+        level = [item for place in level for item in _inside(place)]
+        if not level:
+            return table
+    raise RecursionError
+
+
+def _inside(place: Any) -> Iterable[Any]:
+    if isinstance(place, dict):
+        return place.values()
+    return place if isinstance(place, list) else ()
 
 
 def format_value(value: object) -> str:

@@ -116,7 +116,8 @@ def run_trial(
     if watch is not None:
         last = (len(ticks) - 1) * period
         cloud_W = np.asarray(law.cloud_W()) if known is None else known(last)
-        ending = concluded(setup, ending or Ending("aborted", "the time is up"), ticks[-1], cloud_W)
+        ending = ending or Ending("aborted", "the time is up")
+        ending = concluded(setup, ending, ticks[-1].result, reached[-1], cloud_W, last)
     # Not the ticks' own time, which a fault may make jump.
     elapsed = np.arange(len(ticks), dtype=np.float64) * period
     if truth is None and not without_truth:

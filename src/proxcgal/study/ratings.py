@@ -15,13 +15,14 @@ def read_ratings(path: Path) -> dict[str, list[float]]:
 
     Args:
         path: of a CSV file whose first row names the indicators; ratings are 0 to 10, as in [WT]
-            4.1. An empty cell is no rating.
+            4.1. An empty cell is no rating. It may begin with a byte order mark, as spreadsheets
+            write it.
 
     Raises:
         ConfigError: a file that cannot be read, and all cells that are no rating, one line each.
     """
     try:
-        with path.open(newline="", encoding="utf-8") as file:
+        with path.open(newline="", encoding="utf-8-sig") as file:
             head, *rows = list(csv.reader(file)) or [[]]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise ConfigError(f"ratings {path}: cannot be read: {error}") from None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -65,10 +66,11 @@ def simulate(
                 truth_hz=truth_hz,
             )  # fmt: skip
         with Recorder(recording, ticks) as recorder:
-            return run_trial(
+            log = run_trial(
                 scenario, controller, seed=seed, robot=robot, recorder=recorder,
                 on_progress=report, coverage=coverage,
             )  # fmt: skip
+    return replace(log, recording_failure=recorder.failure)  # closing may have failed too
 
 
 def robot_of(scenario: Scenario, digest: str | None = None) -> Robot:

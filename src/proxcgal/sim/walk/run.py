@@ -14,7 +14,7 @@ from proxcgal.sim.walk.log import WalkLog
 from proxcgal.sim.walk.playback import Played, play
 from proxcgal.sim.walk.poses import PoseRecorder, read_poses
 from proxcgal.sim.walk.setup import PERIOD, WalkSetup
-from proxcgal.sim.walk.stops import Stop, stops_of, worst_stops
+from proxcgal.sim.walk.stops import Stop, not_worst, stops_of, worst_stops
 from proxcgal.sim.walk.taught import TaughtPath, clean
 from proxcgal.sim.walk.teach import START_AT, check_duration, teach
 
@@ -28,6 +28,7 @@ class WalkResult:
     played: Played | None = None
     slow: WalkLog | None = None  #: the same path taught under the hand-guiding rules
     stops: list[Stop] = field(default_factory=list)
+    stops_note: str | None = None  #: why those in the worst posture were left out
 
     def summary(self) -> dict[str, Any]:
         """The numbers of `summary.json`; what does not apply is None."""
@@ -54,6 +55,7 @@ class WalkResult:
              "stop_time_s": s.stop_time_s if np.isfinite(s.stop_time_s) else None}
             for s in self.stops
         ]  # fmt: skip
+        found["stops_note"] = self.stops_note
         return found
 
 
@@ -82,7 +84,8 @@ def run_walk(
     with PoseRecorder(recording, about) as recorder:
         log = teach(setup, seed=seed, recorder=recorder, with_truth=True, on_progress=on_progress)
     if log.trips:
-        return WalkResult(log, stops=stops_of(setup, seed) + worst_stops(setup))
+        stops = stops_of(setup, seed) + worst_stops(setup)
+        return WalkResult(log, stops=stops, stops_note=not_worst(setup))
     if recorder.failure is not None:
         raise RecordingError(f"{recorder.failure}; what it holds is not the whole path")
     poses = read_poses(recording)

@@ -19,6 +19,7 @@ WORST_SPEED, WORST_PAYLOAD = 1.30, 5.0  # [m/s] of the tool, downwards; [kg]
 #: Stretched level before the arm, gun and all; the second joint brings it down.
 STRETCHED = (0.0, np.pi / 2, -1.57, 0.0, 0.0, 0.0)
 _SINKING = 1  # row of that joint
+_DOWN = 0.9  # of the tool's velocity leads downwards, at least
 _RAMP = 0.6  # [s] to that speed
 _WATCHED = 3.0  # [s] after the torque is cut
 
@@ -28,7 +29,7 @@ class Stop:
     """One stop."""
 
     case: str
-    brake_scale: float
+    brake_scale: float  #: of the arm's own brakes' torques
     stop_time_s: float  #: inf where it did not come to rest while it was watched
     stop_distance_m: float
 
@@ -43,18 +44,32 @@ def stops_of(setup: WalkSetup, seed: int) -> list[Stop]:
         other = replace(setup, scenario=setup.scenario.model_copy(update={"arm": arm}))
         log = teach(other, seed=seed)
         if log.trips:
-            stops.append(_stop("as run", scale, log))
+            stops.append(_stop("as run", arm.brake_scale, log))
     return stops
 
 
 def worst_stops(setup: WalkSetup) -> list[Stop]:
     """Stretched level, 5 kg more on the gun, 1.30 m/s downwards, with the same brakes.
 
-    None for an arm of another number of joints: the posture is that of `ga_ol`.
+    None where `not_worst` tells why.
     """
-    if setup.robot.n_q != len(STRETCHED):
-        return []
-    return [_worst(setup, scale) for scale in BRAKE_SCALES]
+    return [] if not_worst(setup) else [_worst(setup, scale) for scale in BRAKE_SCALES]
+
+
+def not_worst(setup: WalkSetup) -> str | None:
+    """Why an arm is not looked at in the worst posture, which is that of `ga_ol`; None: it is."""
+    robot, q = setup.robot, np.array(STRETCHED)
+    told = f"worst posture left out: that of ga_ol does not fit {robot.name}: "
+    if robot.n_q != len(q):
+        return told + f"{robot.n_q} joints, not {len(q)}"
+    outside = np.flatnonzero((q < robot.q_min) | (q > robot.q_max))
+    if len(outside):
+        names = ", ".join(robot.joint_names[row] for row in outside)
+        return told + f"it is beyond the limits of {names}"
+    way_W = np.asarray(robot.tool_jacobian(q))[:3, _SINKING]
+    if -way_W[2] < _DOWN * np.linalg.norm(way_W) or not way_W.any():
+        return told + f"{robot.joint_names[_SINKING]} does not bring the tool down there"
+    return None
 
 
 def _worst(setup: WalkSetup, scale: float) -> Stop:
@@ -62,9 +77,9 @@ def _worst(setup: WalkSetup, scale: float) -> Stop:
     lever = np.linalg.norm(robot.tool_jacobian(q)[:3, _SINKING])
     speed = WORST_SPEED / lever
     q[_SINKING] -= 0.5 * speed * _RAMP  # so that it is level once that fast
+    brakes = scale * setup.scenario.arm.brake_scale
     physics = Physics(
-        setup.arm, q, period=PERIOD, payload=WORST_PAYLOAD,
-        brake_scale=scale * setup.scenario.arm.brake_scale,
+        setup.arm, q, period=PERIOD, payload=WORST_PAYLOAD, brake_scale=brakes
     )  # fmt: skip
     command, cycles = np.zeros(robot.n_q), round(_RAMP / PERIOD)
     for k in range(cycles):
@@ -80,7 +95,7 @@ def _worst(setup: WalkSetup, scale: float) -> Stop:
     moving = np.flatnonzero(np.abs(qd).max(axis=1) > setup.scenario.guard.rest_speed)
     last = int(moving[-1]) + 1 if len(moving) else 0
     return Stop(
-        case="worst posture", brake_scale=scale,
+        case="worst posture", brake_scale=brakes,
         stop_time_s=last * PERIOD if last < watched else float("inf"),
         stop_distance_m=float(np.linalg.norm(np.diff(tool, axis=0), axis=1).sum()),
     )  # fmt: skip
