@@ -25,16 +25,22 @@ _SIDES = 128  # of a cylinder's core, round it: at most 0.03 % of the radius out
 _THIN = 1e-6  # [m] width of what stands for a line or a point
 
 
-@dataclass(frozen=True, slots=True)
-class Box:
-    """Edge lengths along x, y, z."""
+class _Sharp:
+    """A shape whose core is its surface."""
 
-    size: tuple[float, ...]
+    __slots__ = ()
 
     @property
     def rounding(self) -> float:
         """[m] between core and surface."""
         return 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Box(_Sharp):
+    """Edge lengths along x, y, z."""
+
+    size: tuple[float, ...]
 
     @property
     def extent(self) -> Array:
@@ -64,16 +70,11 @@ class Box:
 
 
 @dataclass(frozen=True, slots=True)
-class Cylinder:
+class Cylinder(_Sharp):
     """With flat ends."""
 
     radius: float
     height: float
-
-    @property
-    def rounding(self) -> float:
-        """[m] between core and surface."""
-        return 0.0
 
     @property
     def extent(self) -> Array:
