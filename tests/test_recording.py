@@ -73,6 +73,16 @@ def write(path: Path, ticks: int, settings: Settings = SETTINGS) -> list[Tick]:
     return made
 
 
+def test_time_counts_from_the_first_tick_whatever_the_clock_began_at(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "x.mcap") as recorder:
+        recorder.start(SETTINGS)
+        for time in (27970.94, 27970.95, 27970.965, 31570.965, 31570.975):  # and a jump
+            tick = made_tick(1)
+            recorder.write(replace(tick, given=replace(tick.given, time=time)))
+    read = read_recording(tmp_path / "x.mcap")
+    assert read.elapsed() == pytest.approx([0.0, 0.01, 0.025, 0.035, 0.045])
+
+
 def plain(scans: tuple[px.Scan, ...]) -> list[tuple[object, ...]]:
     return [
         (s.sensor, s.counter, s.stamp, np.asarray(s.ranges).tobytes(), bytes(s.status))

@@ -16,7 +16,7 @@ from proxcgal.sim.recorder import Recorder, Settings
 from proxcgal.sim.scenario import Scenario, change_scenario, load_scenario, parse_scenario
 from proxcgal.sim.setup import Setup
 from proxcgal.sim.source import RecordedSource
-from proxcgal.sim.ticks import Tick, TickInput, TickResult, TickTruth
+from proxcgal.sim.ticks import UNKNOWN, Tick, TickInput, TickResult
 from proxcgal_ros import topics
 from proxcgal_ros.bags import decoded, typestore
 from proxcgal_ros.convert import SECOND, joint_positions, nanoseconds, pose_of, scans_of
@@ -75,7 +75,7 @@ def replay_bag(
         for tick, result in run_ticks(RecordedSource(given), law):
             results.append(result)
             if recorder is not None:
-                recorder.write(Tick(tick, result, TickTruth()))
+                recorder.write(Tick(tick, result, UNKNOWN))
     finally:
         if recorder is not None:
             recorder.close()

@@ -24,7 +24,7 @@ from proxcgal.sim.mounting import SCANS
 from proxcgal.sim.recorder import Recorder, Settings
 from proxcgal.sim.scenario import CONTROLLERS, change_scenario, load_scenario
 from proxcgal.sim.setup import Setup
-from proxcgal.sim.ticks import Tick, TickInput, TickResult, TickTruth
+from proxcgal.sim.ticks import UNKNOWN, Tick, TickInput, TickResult
 from proxcgal_ros import parameters, topics
 from proxcgal_ros.action import MoveRobotAction
 from proxcgal_ros.clocks import Clocks
@@ -126,7 +126,7 @@ class ControllerNode(Node):
                 self.goals.after(given, result)
                 self._show(given, result)
                 if self._recorder is not None:
-                    self._recorder.write(Tick(given, result, TickTruth()))
+                    self._recorder.write(Tick(given, result, UNKNOWN))
                 if result.mode != mode:
                     self._tell_mode(mode, result)
                     mode = result.mode

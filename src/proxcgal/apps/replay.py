@@ -45,7 +45,7 @@ class ReplayOptions:
     file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
     """A recording that `proxcgal run` wrote (.mcap)."""
     at: Annotated[float | None, tyro.conf.arg(metavar="T", help_behavior_hint="")] = None
-    """Show all of the tick at this time [s], instead of a line per tick."""
+    """Show all of the tick at this time since the first [s], instead of a line per tick."""
     every: Annotated[int | None, tyro.conf.arg(metavar="N", help_behavior_hint="(default: 1)")] = (
         None
     )
@@ -94,7 +94,7 @@ def replay_command(options: ReplayOptions, command: str) -> int:
     shown = _recomputed(recording, options.controller, changes) if again else recording
     _print_header(shown)
     if row is not None:
-        _show_tick(shown.ticks[row])
+        _show_tick(shown.ticks[row], float(shown.elapsed()[row]))
         return 0
     log = recorded_log(shown)
     _walk(_lines(log, shown.ticks, every), step=options.step)
@@ -160,7 +160,7 @@ def _print_header(recording: Recording) -> None:
     settings = recording.settings
     print(
         f"{settings.scenario.name}, {settings.controller}, seed {settings.seed}: "
-        f"{len(recording.ticks)} ticks, {recording.ticks[-1].given.time:.2f} s"
+        f"{len(recording.ticks)} ticks, {recording.elapsed()[-1]:.2f} s"
         + ("" if settings.ticks == "all" else "; those with scans only, and so are the numbers")
     )
 
@@ -172,10 +172,10 @@ def _lines(log: TrialLog, ticks: Sequence[Tick], every: int) -> Iterator[str]:
         f"{'time':>7}  {'seen':>6}  {'true':>6}  {'act':>4}  {'goal':>6}  {'mode':<8}  "
         f"{'moves':<{width}}  findings"
     )
-    for row in range(0, len(log.time), every):
+    for row in range(0, len(log.elapsed), every):
         found = ", ".join(dict.fromkeys(f.reason for f in ticks[row].result.findings))
         yield (
-            f"{log.time[row]:7.2f}  {_metres(log.seen_m[row])}  {_metres(log.true_m[row])}  "
+            f"{log.elapsed[row]:7.2f}  {_metres(log.seen_m[row])}  {_metres(log.true_m[row])}  "
             f"{log.activation[row]:4.2f}  {log.goal_error_m[row]:6.3f}  "
             f"{MODES[log.mode[row]]:<8}  {log.control_link[row]:<{width}}  {found}"
         ).rstrip()
@@ -214,25 +214,26 @@ def _compare(recording: Recording, log: TrialLog) -> None:
     row = int(apart.argmax())
     print(
         f"commands: differ from the recorded ones in {np.count_nonzero(apart)} of {len(apart)} "
-        f"ticks, most by {apart[row]:.4f} rad/s at {log.time[row]:.2f} s; the arm moves as recorded"
+        f"ticks, most by {apart[row]:.4f} rad/s at {log.elapsed[row]:.2f} s; the arm moves as recorded"
     )
 
 
 def _row_at(recording: Recording, time: float) -> int:
     """Row of the first tick at or after that time. Raises: ConfigError outside the recording."""
-    last = recording.ticks[-1].given.time
+    times = recording.elapsed()
+    last = float(times[-1])
     if not 0.0 <= time <= last:
         raise ConfigError(f"--at {time:g}: must be 0 to {last:g} s, which the recording holds")
-    times = [tick.given.time for tick in recording.ticks]
     return int(np.searchsorted(times, time - 1e-9))
 
 
-def _show_tick(tick: Tick) -> None:
-    """Everything of one tick."""
+def _show_tick(tick: Tick, elapsed: float) -> None:
+    """Everything of one tick, `elapsed` after the first [s]."""
     given, result, truth = tick.given, tick.result, tick.truth
     sensors = ", ".join(str(scan.sensor) for scan in given.scans)
     rows = [
-        ("time", f"{given.time:.4f} s{', late' if given.late else ''}"),
+        ("time", f"{elapsed:.4f} s{', late' if given.late else ''}"),
+        *([("clock", f"{given.time:.4f} s")] if abs(given.time - elapsed) > 1e-3 else []),
         ("q", _vector(given.q)),
         ("goal", _vector(given.goal[:3, 3])),
         ("scans", sensors or ("known points" if given.known else "none")),

@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 Points = NDArray[np.float32]
 
 MODES = ("RUN", "DEGRADED", "HOLD", "STOP")
+_NOTHING = 9.0  # [m] as far as that is nothing
 
 
 def _no_points() -> Points:
@@ -117,6 +118,13 @@ class Moment(Posed):
             tick_us=result.tick_us,
             qd=result.qd,
         )
+
+
+def metres(distance: float) -> str:
+    """A distance in words; nan where nobody knows it, inf where there is nothing."""
+    if np.isnan(distance):
+        return "unknown"
+    return f"{distance:.3f} m" if distance < _NOTHING else "none"
 
 
 def without(points: Array, some: Array) -> Array:

@@ -35,6 +35,8 @@ from proxcgal.sim.ticks import Tick
 __all__ = ["Recorder", "Recording", "Settings", "read_recording"]
 
 _HEAD = 9  # opcode and length of a record
+_LONGEST_STEP = 1.0  # [s] from tick to tick; beyond, the clock has jumped
+_SAME_STEP = 1e-6  # [s] a simulator's ticks are as even as that
 _SUMMARY_CRC = 4  # closes the footer, not part of what it covers
 
 
@@ -46,6 +48,22 @@ class Recording:
     settings: Settings
     ticks: tuple[Tick, ...]
     damage: str | None  #: where and why reading ended early; None for a whole file
+
+    def elapsed(self) -> Array:
+        """(n,) [s] since the first tick, whatever clock the ticks were stamped by.
+
+        Where that clock jumps, as a fault makes it, a period counts instead. Of a recording that
+        holds ticks with scans only, the run's own time.
+        """
+        times = np.array([tick.given.time for tick in self.ticks])
+        if self.settings.ticks != "all" or len(times) < 2:
+            return times if self.settings.ticks != "all" else np.zeros(len(times))
+        period = 1.0 / self.settings.scenario.simulation.control_hz
+        steps = np.diff(times)
+        steps[(steps <= 0.0) | (steps > _LONGEST_STEP)] = period
+        if np.abs(steps - period).max() < _SAME_STEP:
+            return np.arange(len(times), dtype=np.float64) * period
+        return np.r_[0.0, np.cumsum(steps)]
 
     def postures(self) -> Iterator[Array]:
         """(n_q,) of each tick, to draw: the last finite one where a joint state is no number."""
@@ -224,4 +242,5 @@ class _Contents:
     def _so_far(self) -> str:
         if not self._ticks:
             return ", before the first tick"
-        return f", after {len(self._ticks)} ticks up to {self._ticks[-1].given.time:.3f} s"
+        lasts = self._ticks[-1].given.time - self._ticks[0].given.time
+        return f", after {len(self._ticks)} ticks, {lasts:.3f} s after the first"

@@ -92,11 +92,10 @@ def recompute(
     begin = clock.perf_counter()
     again = Replay(recording, controller, overrides)
     ticks = list(again)
-    elapsed = np.arange(len(ticks), dtype=np.float64) * again.law.config.period
     return TrialLog.of(
         ticks, again.setup.robot, scenario=again.setup.scenario.name,
         controller=again.controller, seed=recording.settings.seed,
-        wall_s=clock.perf_counter() - begin, elapsed=elapsed,
+        wall_s=clock.perf_counter() - begin, elapsed=recording.elapsed(),
     )  # fmt: skip
 
 
@@ -112,10 +111,8 @@ def first_difference(recording: Recording) -> int | None:
 def recorded_log(recording: Recording) -> TrialLog:
     """The log of the run itself, as it was recorded."""
     settings = recording.settings
-    period = 1.0 / settings.scenario.simulation.control_hz
-    elapsed = np.arange(len(recording.ticks), dtype=np.float64) * period
     return TrialLog.of(
         recording.ticks, Setup.of(settings.scenario).robot, scenario=settings.scenario.name,
         controller=settings.controller, seed=settings.seed, wall_s=0.0,
-        elapsed=elapsed if settings.ticks == "all" else None,
+        elapsed=recording.elapsed(),
     )  # fmt: skip

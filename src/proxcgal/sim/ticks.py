@@ -132,6 +132,10 @@ class TickTruth:
     leaked: int = 0  #: points of the filtered cloud that really are the robot itself
 
 
+#: Of a robot outside the simulator: nobody knows.
+UNKNOWN = TickTruth(distance=np.nan, own=np.nan)
+
+
 @dataclass(frozen=True, slots=True)
 class Tick:
     """One tick, whole."""

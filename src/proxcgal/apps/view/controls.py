@@ -22,7 +22,7 @@ from proxcgal.apps.view.gate import Gate
 from proxcgal.apps.view.panel import Panel, pace, timing
 from proxcgal.apps.view.plots import Plots
 from proxcgal.apps.view.stage import Stage
-from proxcgal.sim.moment import MODES, Moment
+from proxcgal.sim.moment import MODES, Moment, metres
 from proxcgal.sim.scenario import CONTROLLERS, Scenario
 
 _AS_THEY_ARE = "as they are"
@@ -142,7 +142,7 @@ def _number_of(text: str) -> int:
 
 
 def _status(told: Told, moment: Moment, note: str) -> str:
-    seen, true = (f"{d:.3f} m" if d < 9.0 else "nothing" for d in (moment.seen, moment.true))
+    seen, true = map(metres, (moment.seen, moment.true))
     lines = [
         f"**{MODES[moment.mode]}** at {moment.elapsed:.1f} s" + pace(told),
         f"seen {seen}, true {true}, activation {moment.activation:.2f}",

@@ -14,7 +14,7 @@ from proxcgal.apps.view.gate import Gate
 from proxcgal.apps.view.messages import between, one_of, switch
 from proxcgal.apps.view.plots import whole_run
 from proxcgal.apps.view.replayed import AHEAD, Replayed
-from proxcgal.sim.moment import MODES, Moment
+from proxcgal.sim.moment import MODES, Moment, metres
 
 HZ = 15.0  #: moments of a second of the recording
 _SPEEDS = ("1/4", "1/2", "1", "2")
@@ -157,7 +157,7 @@ def _status(moment: Moment, other: Moment | None) -> str:
 
 
 def _words(moment: Moment) -> str:
-    seen, true = (f"{d:.3f} m" if d < 9.0 else "nothing" for d in (moment.seen, moment.true))
+    seen, true = map(metres, (moment.seen, moment.true))
     return (
         f"seen {seen}, true {true}, activation {moment.activation:.2f}, "
         f"moves {moment.link or 'nothing'}"

@@ -51,13 +51,13 @@ def replayed(
     Raises:
         ConfigError: a bad override; what the recording does not hold.
     """
-    settings = recording.settings
+    settings, times = recording.settings, recording.elapsed()
     if settings.ticks != "all" and controller is None and not overrides:
         setup = Setup.of(settings.scenario)
         rows = range(len(recording.ticks))
         moments = [
-            _moment(setup, None, tick, q, tick.given.time)
-            for tick, q in zip(recording.ticks, recording.postures(), strict=True)
+            _moment(setup, None, tick, q, float(time))
+            for tick, q, time in zip(recording.ticks, recording.postures(), times, strict=True)
         ]
         return Replayed(Stage.of(setup), settings.controller, tuple(moments), None, len(rows))
     again = Replay(recording, controller, overrides)
@@ -69,7 +69,7 @@ def replayed(
     for row, (then, now, q) in enumerate(both):
         same += now.result.same(then.result)
         if row % step == 0 or row == last:
-            moments.append(_moment(again.setup, again, now, q, row * period))
+            moments.append(_moment(again.setup, again, now, q, float(times[row])))
     if ahead:
         moments = [_ahead(again.setup, moment) for moment in moments]
     return Replayed(
