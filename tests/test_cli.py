@@ -108,6 +108,32 @@ def test_scenarios_and_robots_are_listed_with_a_line_each(call: Call) -> None:
 
 
 @pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["run", "front_plane", "--controller", "ws"],
+         "--controller ws: must be one of wb, sm, wb_known, wb_memory"),
+        (["run", "front_plane", "--controller", "None"],
+         "--controller None: must be one of wb, sm, wb_known, wb_memory"),
+        (["campaign", "hri", "--seed=None"], "--seed None: must be a whole number"),
+        (["run", "front_plane", "--subject", "nan"], "--subject nan: must be a whole number"),
+        (["view", "front_plane", "--port", "abc"], "--port abc: must be a whole number"),
+        (["replay", "x.mcap", "--at", "soon"], "--at soon: must be a number"),
+        (["replay", "x.mcap", "--at"], "--at: value missing: must be a number"),
+        (["campaign", "dynamic"],
+         "KIND dynamic: must be one of static, faults, walkthrough, joint, hri"),
+        (["run", "front_plane", "--controler", "sm"],
+         "--controler: not known; did you mean --controller?"),
+        (["run", "front_plane", "more"],
+         "more: not known; proxcgal run --help tells what there is"),
+        (["run"], "SCENARIO: missing; proxcgal run --help tells what it is"),
+    ],
+)  # fmt: skip
+def test_what_the_parser_refuses_is_one_line(call: Call, words: list[str], told: str) -> None:
+    answer = call(*words)
+    assert (answer.code, answer.out, answer.err) == (2, "", f"proxcgal: {told}\n")
+
+
+@pytest.mark.parametrize(
     ("arguments", "told"),
     [
         (["run", "no_such_scene"], ["front_plane"]),

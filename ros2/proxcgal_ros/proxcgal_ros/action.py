@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 
 from proxcgal_msgs.action import MoveRobot
@@ -23,6 +24,15 @@ class _Pursued:
     handle: ServerGoalHandle
     number: int
     ended: Future = field(default_factory=Future)
+
+
+#: Fields of the goal that the action has other names for.
+_NAMES = {"init": "init_config_name", "rpy": "rotation"}
+
+
+def _in_ros(reason: str) -> str:
+    """A reason with the action's names of what it is about."""
+    return re.sub(r"^(init|rpy) =", lambda found: f"{_NAMES[found[1]]} =", reason)
 
 
 class MoveRobotAction:
@@ -73,7 +83,7 @@ class MoveRobotAction:
         try:
             self._numbers[id(request)] = self._server.send_goal(goal)
         except GoalRefusedError as refusal:
-            reasons = str(refusal).splitlines()
+            reasons = [_in_ros(reason) for reason in str(refusal).splitlines()]
             for reason in reasons:
                 self._node.get_logger().warning(f"goal refused: {reason}")
             now = self._node.get_clock().now().nanoseconds

@@ -112,6 +112,8 @@ class _Content:
         self.commands: list[Array] = []
         self.topics: set[str] = set()
         self._messages: list[tuple[str, int, Any]] = []
+        if not bag.exists():
+            raise ConfigError(f"bag {bag}: no such file or folder")
         try:
             store = typestore()
             with AnyReader([bag], default_typestore=store) as reader:
@@ -122,7 +124,7 @@ class _Content:
         except ConfigError:
             raise
         except Exception as error:  # readers do not say what a damaged file makes them raise
-            reason = str(error) or type(error).__name__
+            reason = _reason(str(error) or type(error).__name__)
             raise ConfigError(f"bag {bag}: cannot be read: {reason}") from None
 
     def _take(self, topic: str, stamp: int, message: Any) -> None:
@@ -160,6 +162,11 @@ class _Content:
                 for end, rows in rows_of.items():
                     if topic.endswith(end):
                         scans += scans_of(message, rows, lambda ns: ns / SECOND, now, restarts)
+
+
+def _reason(words: str) -> str:
+    """What the reader says, in one line; it names no bag, or names it again."""
+    return " ".join(words.split()).rstrip(".!")
 
 
 def _wanted(reader: AnyReader) -> list[Any]:

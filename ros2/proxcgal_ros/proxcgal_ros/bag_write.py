@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -37,7 +38,8 @@ Message = tuple[str, int, Any]  # topic, log time [ns], what is told
 def write_bag(recording: Path, bag: Path) -> dict[str, int]:
     """Writes every tick of a recording, and what the bag needs to be replayed.
 
-    Clouds are computed again, from the recorded inputs, where every tick was recorded.
+    Clouds are computed again, from the recorded inputs, where every tick was recorded. Of a damaged
+    recording the bag holds what comes before the damage, which a warning tells.
 
     Args:
         recording: MCAP file of proxcgal.
@@ -51,6 +53,8 @@ def write_bag(recording: Path, bag: Path) -> dict[str, int]:
         ConfigError: the folder is there already, or cannot be made.
     """
     read = read_recording(recording)
+    if read.damage:
+        warnings.warn(f"{recording}: damaged: {read.damage}", RuntimeWarning, stacklevel=2)
     if bag.exists():
         raise ConfigError(f"bag {bag}: is there already")
     store = typestore()

@@ -5,8 +5,11 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import re
 import sys
+import warnings
 from pathlib import Path
+from typing import NoReturn
 
 from rclpy.utilities import remove_ros_args
 
@@ -15,9 +18,10 @@ from proxcgal.errors import ConfigError, ProxError
 
 def main() -> int:
     """Runs a command; 2 where the input was bad, told in one line for each problem."""
+    warnings.showwarning = _note
     arguments = sys.argv
-    options = _parser().parse_args(remove_ros_args(arguments)[1:])
     try:
+        options = _parser().parse_args(_own(arguments))
         return int(options.run(options, arguments))
     except ProxError as error:
         for line in str(error).splitlines():
@@ -25,6 +29,36 @@ def main() -> int:
         return 2
     except KeyboardInterrupt:  # before a node took its signals over
         return 130
+
+
+def _note(message: Warning | str, *_: object, **__: object) -> None:
+    """A warning as one line, without the place in our code that it came from."""
+    print(f"note: {message}", file=sys.stderr)
+
+
+def _own(arguments: list[str]) -> list[str]:
+    """Those that are not ROS 2's. Raises: ConfigError, some behind --ros-args that are nobody's."""
+    split = arguments.index("--ros-args") if "--ros-args" in arguments else len(arguments)
+    for word in arguments[1:split]:
+        if re.match(r"[~/\w]+:=", word):  # ROS 2 takes these, and tells no one who means the other
+            warnings.warn(f"{word}: taken for a remapping; {PARAMETERS}", stacklevel=2)
+    try:
+        return remove_ros_args(arguments)[1:]
+    except RuntimeError:  # rclpy's own kind of it has no public name
+        raise ConfigError(
+            f"{' '.join(arguments[split:])}: not understood; {PARAMETERS}"
+        ) from None
+
+
+PARAMETERS = "parameters are given as --ros-args -p NAME:=VALUE"
+
+
+class _Parser(argparse.ArgumentParser):
+    """Tells what is wrong in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Ends the process with exit code 2."""
+        self.exit(2, f"error: {message}; {self.prog} --help tells what there is\n")
 
 
 def _node(options: argparse.Namespace, arguments: list[str]) -> int:
@@ -119,7 +153,7 @@ def _replay(options: argparse.Namespace, arguments: list[str]) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="proxcgal_ros", description="Whole-arm avoidance as ROS 2 nodes.",
         epilog="ROS 2's own arguments go behind --ros-args, parameters as -p NAME:=VALUE.",
     )  # fmt: skip

@@ -13,6 +13,7 @@ from proxcgal.apps.joint_server import JointRobotServer
 from proxcgal_ros import topics
 from proxcgal_ros.action import MoveRobotAction
 from proxcgal_ros.convert import header, joint_message
+from proxcgal_ros.parameters import warn_unknown
 
 JOINTS_HZ = 50.0
 
@@ -65,6 +66,7 @@ class JointNode(Node):
         self._joints = self.create_publisher(JointState, topics.JOINT_STATES, topics.RELIABLE_QOS)
         self.create_timer(1.0 / JOINTS_HZ, self._tell)
         self._action = MoveRobotAction(self, JointGoals(self._server))
+        warn_unknown(self)
         self.get_logger().info(f"{scenario}: {self._server.robot.name} takes goals")
 
     def run(self) -> None:

@@ -37,6 +37,7 @@ class Rules:
     position_tolerance: float = 0.03  #: [m]
     angle_tolerance: float = 0.05  #: [rad]
     timeout: float = 60.0  #: [s]
+    way_out: str = "start the node anew"  #: of a STOP, once its cause is gone
     preempt: bool = True  #: a goal replaces the one that is pursued; else it is refused
 
 
@@ -83,7 +84,7 @@ class LiveGoals:
         if self._tool is None:
             problems.append("no joint states yet")
         if self._last is not None and self._last.mode == _STOP:
-            problems.append("the monitor has stopped the arm; it takes goals again after a reset")
+            problems.append(f"the monitor has stopped the arm: {self.rules.way_out}")
         if not self.rules.preempt and self._goals.active is not None:
             problems.append(f"goal {self._goals.active.number} is being pursued")
         if not problems and self._tool is not None:

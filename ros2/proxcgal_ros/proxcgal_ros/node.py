@@ -35,6 +35,7 @@ from proxcgal_ros.pacing import CloudPace, Pace
 from proxcgal_ros.source import RosSource
 
 LIVE_CONTROLLERS = tuple(name for name in CONTROLLERS if name != "wb_known")
+_STOP = 3  # of Mode
 VIEWS_HZ = 2.0  # fields of view are many lines
 
 
@@ -92,6 +93,11 @@ class ControllerNode(Node):
         self._action = MoveRobotAction(self, self.goals)
         if parameters.fixed_switch(self, "reset_service", "offer ~/reset, which leaves a STOP"):
             self.create_service(Trigger, "~/reset", self._reset)
+            self._rules.way_out = "call ~/reset once its cause is gone"
+        else:
+            self._rules.way_out = (
+                "start the node anew; with reset_service:=true it offers ~/reset too"
+            )
         self._look = parameters.fixed_switch(
             self, "check_mounts",
             "compare what sensors see of the arm itself with their mounts, standing still, before "
@@ -100,6 +106,7 @@ class ControllerNode(Node):
         record = parameters.fixed_text(self, "record", "", "MCAP file for every tick; empty: none")
         self._recorder = Recorder(Path(record)) if record else None
         parameters.on_change(self, self._change)
+        parameters.warn_unknown(self)
         self.get_logger().info(
             f"{setup.robot.name}, {len(setup.skin)} sensors, controller {controller}; waiting for "
             f"{', '.join(self.setup.robot.joint_names)} on {topics.JOINT_STATES}"
@@ -198,7 +205,13 @@ class ControllerNode(Node):
     def _reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         del request
         response.success = bool(self.law.reset())
-        response.message = "left STOP" if response.success else "not stopped, or its cause lasts"
+        if response.success:
+            response.message = "left STOP"
+        elif self._last is None or self._last.mode != _STOP:
+            response.message = "not stopped"
+        else:
+            reasons = ", ".join(sorted({found.reason for found in self._last.findings}))
+            response.message = f"still stopped, as the cause lasts: {reasons or 'unknown'}"
         return response
 
     def _tuned(self, setup: Setup, numbers: dict[str, float]) -> Setup:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -139,6 +140,20 @@ def declare_second_goal(node: Node) -> str:
     if value not in SECOND_GOAL:
         raise ConfigError(f"parameter second_goal = {value!r}: one of {', '.join(SECOND_GOAL)}")
     return value
+
+
+def warn_unknown(node: Node) -> None:
+    """A warning for each parameter of the launch that the node has not declared: it does nothing.
+
+    Call it once all are declared.
+    """
+    known = sorted(node.get_parameters_by_prefix(""))
+    for name in getattr(node, "_parameter_overrides", {}):
+        if node.has_parameter(name) or name.startswith("qos_overrides."):
+            continue
+        near = difflib.get_close_matches(name, known, n=3)
+        hint = f"did you mean {' or '.join(near)}?" if near else f"there are {', '.join(known)}"
+        node.get_logger().warning(f"parameter {name}: not known, it changes nothing; {hint}")
 
 
 def on_change(node: Node, apply: Callable[[dict[str, object]], None]) -> None:

@@ -10,6 +10,8 @@ from types import FrameType
 import rclpy
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 
+from proxcgal.errors import ConfigError
+
 try:  # much less time a message, where this ROS 2 has it
     from rclpy.experimental import EventsExecutor
 except ImportError:
@@ -29,7 +31,14 @@ def spinning(arguments: list[str]) -> Iterator[tuple[Executor, Callable[[], bool
         del number, frame
         ended = True
 
-    rclpy.init(args=arguments, signal_handler_options=rclpy.SignalHandlerOptions.NO)
+    try:
+        rclpy.init(args=arguments, signal_handler_options=rclpy.SignalHandlerOptions.NO)
+    except RuntimeError:  # rclpy's own kinds of it have no public name
+        words = arguments[arguments.index("--ros-args") + 1 :] if "--ros-args" in arguments else []
+        raise ConfigError(
+            f"--ros-args {' '.join(words)}: not understood; parameters are given as "
+            "--ros-args -p NAME:=VALUE"
+        ) from None
     for number in (signal.SIGINT, signal.SIGTERM):  # for good: the process ends after this
         signal.signal(number, end)
     executor: Executor = SingleThreadedExecutor() if EventsExecutor is None else EventsExecutor()

@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 from proxcgal.sim.decisive import decisive_truth
-from proxcgal.sim.scenario import Scenario, change_scenario
+from proxcgal.sim.scenario import Scenario
 from proxcgal.sim.setup import Setup
 from proxcgal.sim.source import SimulatedSource
 from proxcgal.sim.trial_log import NOTHING, TOO_CLOSE, final_ticks
@@ -37,6 +38,7 @@ from proxcgal_ros.convert import (
     nanoseconds,
     scan_messages,
 )
+from proxcgal_ros.parameters import warn_unknown
 
 Array = NDArray[np.float64]
 
@@ -68,6 +70,7 @@ class SimulatedArm(Node):
         self.create_subscription(
             Float64MultiArray, topics.COMMANDS, self._take_command, topics.NEWEST_QOS
         )
+        warn_unknown(self)
         self.get_logger().info(
             f"{scenario.name}: {self.setup.robot.name}, for {scenario.duration:g} s once it moves"
         )
@@ -150,8 +153,9 @@ class SimulatedSensors(Node):
         """Loads the scenario. Raises: ProxError."""
         super().__init__("proxcgal_sensors")
         self._executor, self._running = executor, running
-        endless = change_scenario(scenario, "sensors", [f"duration={ENDLESS}"])
-        setup = Setup.of(endless)
+        setup = Setup.of(scenario)
+        endless = scenario.model_copy(update={"duration": ENDLESS})  # who begins it, takes his time
+        setup = replace(setup, scenario=endless)  # its people move for as long as the scenario is
         self._world = _Begun(World(setup.robot, setup.scene))
         self._source = SimulatedSource(setup, self._world, scenario.seed)  # type: ignore[arg-type]
         self._names = list(setup.robot.joint_names)
@@ -222,7 +226,7 @@ def sensors_beside(arguments: Sequence[str]) -> Iterator[None]:
 
 #: Its standard input closes when the parent dies, even of SIGKILL.
 _CHILD = """
-import os, signal, sys, threading
+import os, signal, sys, threading, warnings
 
 def watch():
     while os.read(0, 1):
@@ -230,6 +234,7 @@ def watch():
     os.kill(os.getpid(), signal.SIGTERM)
 
 threading.Thread(target=watch, daemon=True).start()
+warnings.simplefilter("ignore")  # the arm's process has told them
 from proxcgal_ros.cli import main
 sys.exit(main())
 """

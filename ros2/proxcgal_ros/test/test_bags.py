@@ -66,6 +66,16 @@ def test_a_bag_is_read_back_with_all_messages(
     assert statistics.message_count == sum(counts.values())
 
 
+def test_a_damaged_recording_is_told_and_its_bag_holds_what_comes_before(
+    recording: Recording, tmp_path: Path
+) -> None:
+    data = recording.path.read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(data[: len(data) // 2])
+    with pytest.warns(RuntimeWarning, match=r"cut\.mcap: damaged"):
+        counts = write_bag(tmp_path / "cut.mcap", tmp_path / "bag")
+    assert 0 < counts["/joint_states"] < len(recording.ticks)
+
+
 def test_what_ros_2_reads_in_a_bag_is_what_was_recorded(
     recording: Recording, bag: tuple[Path, dict[str, int]]
 ) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from proxcgal_ros import cli
+from proxcgal_ros.action import _in_ros
 
 
 @pytest.mark.parametrize(
@@ -19,7 +20,8 @@ from proxcgal_ros import cli
         (["sim", "front_plane", "--out", "."], "--out .: cannot be written"),
         (["sim", "front_plane", "--set", "controller.d_min=-1"], "controller.d_min"),
         (["bag", "file", "bag"], "not a recording"),
-        (["replay", "nowhere"], "bag nowhere: cannot be read"),
+        (["replay", "nowhere"], "bag nowhere: no such file or folder"),
+        (["node", "--ros-args", "d_min:=0.3"], "--ros-args -p NAME:=VALUE"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_2_and_writes_nothing(
@@ -35,3 +37,10 @@ def test_bad_input_is_one_line_and_exit_2_and_writes_nothing(
     assert said.count("\n") == 1
     assert told in said
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def test_reasons_name_the_fields_of_the_action() -> None:
+    assert _in_ros("init = 'zzz': there are free, jl") == (
+        "init_config_name = 'zzz': there are free, jl"
+    )
+    assert _in_ros("frame = 'base': must be one of kuka_base").startswith("frame = ")

@@ -271,3 +271,14 @@ def test_a_parameter_that_cannot_be_ends_the_node_with_a_line(
     assert processes.start("node", "node", "--ros-args", "-p", given).wait(PATIENCE) == 2
     assert f"error: parameter {told}" in processes.said("node")
     assert "Traceback" not in processes.said("node")
+
+
+def test_a_parameter_that_the_node_does_not_know_is_told(processes: Processes) -> None:
+    given = ("-p", "d_mim:=0.3", "-p", "second_goal:=preempt")
+    processes.start("node", "node", "--ros-args", *given)
+    told = "parameter d_mim: not known, it changes nothing; did you mean d_min?"
+    end = time.monotonic() + PATIENCE
+    while told not in processes.said("node") and time.monotonic() < end:
+        time.sleep(0.05)
+    assert told in processes.said("node")
+    assert "second_goal: not known" not in processes.said("node")

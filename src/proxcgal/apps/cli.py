@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import inspect
 import os
 import shlex
 import sys
@@ -93,25 +92,22 @@ def call(command: str, arguments: Sequence[str]) -> int:
     """Parses the options of one command and runs it; the exit code, as `main` has it."""
     try:
         options = parse(command, arguments)
-    except SystemExit as end:  # help, or the parser's own message
+    except SystemExit as end:  # help
         return int(end.code or 0)
+    except ProxError as error:
+        _tell(str(error))
+        return BAD_INPUT
     run: Callable[[Any, str], int] = getattr(import_module(COMMANDS[command]), f"{command}_command")
     text = shlex.join(("proxcgal", command, *arguments))  # what reports say they were made by
     return guarded(lambda: run(options, text))
 
 
 def parse(command: str, arguments: Sequence[str]) -> Any:
-    """The options of one command. Raises: SystemExit after help or the parser's message."""
-    import tyro  # 0.2 s that `--help` and a wrong command need not wait for
+    """The options of one command. Raises: SystemExit after help; ConfigError, what is wrong."""
+    from proxcgal.apps.parsing import parse as parsed
 
     options_type = getattr(import_module(COMMANDS[command]), f"{command.capitalize()}Options")
-    return tyro.cli(
-        options_type,
-        prog=f"proxcgal {command}",
-        description=inspect.cleandoc(options_type.__doc__ or ""),  # examples and all
-        args=list(arguments),
-        config=(tyro.conf.FlagCreatePairsOff,),
-    )
+    return parsed(options_type, f"proxcgal {command}", arguments)
 
 
 def guarded(work: Callable[[], int]) -> int:
