@@ -50,6 +50,15 @@ def test_a_goal_is_reached_and_its_feedback_says_how_it_goes() -> None:
         assert arm.feedback() is None
 
 
+def test_a_server_that_was_closed_takes_nothing_on_and_does_not_start_again() -> None:
+    with server("joint_free") as arm, pytest.raises(px.GoalRefusedError, match="a JointGoal"):
+        arm.send_goal(None)  # type: ignore[arg-type]
+    with pytest.raises(px.GoalRefusedError, match="was closed"):
+        arm.send_goal(px.JointGoal(translation=REACHED, init="jl"))
+    with pytest.raises(px.ConfigError, match="was closed"):
+        arm.start()
+
+
 def test_a_goal_held_off_by_an_obstacle_is_aborted_with_what_holds_it() -> None:
     with server("joint_cylinder_tight") as arm:
         number = arm.send_goal(px.JointGoal(translation=REACHED, init="jl"))

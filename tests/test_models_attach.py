@@ -150,6 +150,7 @@ def test_a_full_mesh_is_never_the_coarse_one() -> None:
     [
         ("abc", "x_", "pose = abc; a finite"),
         (np.eye(3), "x_", "pose has shape"),
+        (np.full((4, 4), np.nan), "x_", "pose holds NaN"),
         (np.eye(4), 3, "prefix = 3; a text, or two"),
         (np.eye(4), ("a", "b", "c"), "prefix = .*; a text, or two"),
     ],
@@ -159,3 +160,8 @@ def test_what_no_robot_can_be_hung_by_is_told(
 ) -> None:
     with pytest.raises(px.ModelError, match=said):
         px.attach(ur10e, "tool0", ur10e, pose, prefix)  # type: ignore[arg-type]
+
+
+def test_what_is_no_robot_is_told_by_the_arguments_name() -> None:
+    with pytest.raises(px.ModelError, match="robot = 'ur10e': a Robot is needed"):
+        px.attach("ur10e", "tool0", px.load_robot("ur10e"), np.eye(4), "x_")  # type: ignore[arg-type]

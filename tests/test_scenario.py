@@ -13,6 +13,7 @@ from proxcgal.errors import ConfigError
 from proxcgal.sim import toml
 from proxcgal.sim.scenario import Scenario, kinds, list_scenarios, load_scenario, parse_scenario
 from proxcgal.sim.scenario_joint import JointScenario
+from proxcgal.sim.setup import Setup
 
 DOCS = Path(__file__).parents[1] / "docs" / "scenarios.md"
 
@@ -293,3 +294,24 @@ def test_the_scenario_in_the_documentation_can_be_copied(tmp_path: Path) -> None
     path = tmp_path / "copied.toml"
     path.write_text(DOCS.read_text().split("```toml\n")[1].split("```")[0])
     assert load_scenario(path).name == "copied"
+
+
+@pytest.mark.parametrize(
+    ("change", "allowed"),
+    [
+        ("duration=1e12", "100000"), ("simulation.control_hz=1e9", "10000"),
+        ("simulation.sensor_hz=1e9", "10000"), ("seed=9223372036854775808", "9223372036854775808"),
+    ],
+)  # fmt: skip
+def test_what_would_never_end_is_refused(change: str, allowed: str) -> None:
+    with pytest.raises(ConfigError, match=f"{change.partition('=')[0]}.* less than .*{allowed}"):
+        load_scenario("front_plane", [change])
+
+
+def test_all_that_a_scenario_says_of_another_robot_is_told_at_once() -> None:
+    scenario = load_scenario("front_plane", ["robot=panda", "controller.avoid_links=['nowhere']"])
+    with pytest.raises(ConfigError) as told:
+        Setup.of(scenario)
+    assert "q0 has 6 values" in str(told.value)
+    assert "skin.rings.0.link = 'forearm_link'" in str(told.value)
+    assert "controller.avoid_links.0 = 'nowhere'" in str(told.value)

@@ -193,9 +193,10 @@ inline Pose pose_from(nb::handle value, const char* name, Take take = Take::kCon
   Pose pose;
   pose.matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(view.data());
   if (rigid) {
+    if (!pose.matrix().allFinite())
+      throw GeometryError(std::string(name) + " is not finite: it holds NaN or infinity");
     const Eigen::Matrix3d R = pose.linear();
-    const bool ok = pose.matrix().allFinite() &&
-                    (R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-6 &&
+    const bool ok = (R * R.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-6 &&
                     R.determinant() > 0.0 && pose.matrix().row(3) == Eigen::RowVector4d(0, 0, 0, 1);
     if (!ok)
       throw GeometryError(std::string(name) +

@@ -45,9 +45,7 @@ def _own(arguments: list[str]) -> list[str]:
     try:
         return remove_ros_args(arguments)[1:]
     except RuntimeError:  # rclpy's own kind of it has no public name
-        raise ConfigError(
-            f"{' '.join(arguments[split:])}: not understood; {PARAMETERS}"
-        ) from None
+        raise ConfigError(f"{' '.join(arguments[split:])}: not understood; {PARAMETERS}") from None
 
 
 PARAMETERS = "parameters are given as --ros-args -p NAME:=VALUE"

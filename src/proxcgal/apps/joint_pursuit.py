@@ -27,6 +27,7 @@ class PursuedGoal(Pursued):
     watch: GoalWatch | None = None
     over: bool = False  # it is followed no more: what held the arm is being found out
     ending: Ending | None = None  # what came of that
+    remain: tuple[float, float] | None = None  # [m] and [rad] to the goal as it was given up
 
 
 class JointPursuit:
@@ -70,7 +71,7 @@ class JointPursuit:
                 self.end("cancelled", reason)
         elif active.over:
             if active.ending is not None:
-                self.end(active.ending.outcome, active.ending.reason)
+                self.end(active.ending.outcome, active.ending.reason, active.remain)
         elif arm.stopped:
             self.end("aborted", f"the monitor stopped the arm: {arm.findings}")
         elif active.state == "starting":
@@ -91,6 +92,9 @@ class JointPursuit:
             return
         setup = arm.setup
         last, points_W = arm.asked()
+        if active.T_WT is not None:  # of the tick that the reason is about
+            tool = np.asarray(setup.robot.tool_pose(last.given.q))
+            active.remain = pose_errors(tool, active.T_WT)
 
         def judge() -> None:
             try:
@@ -102,18 +106,24 @@ class JointPursuit:
         if wait:
             judge()
             found = active.ending or ending
-            self.end(found.outcome, found.reason)
+            self.end(found.outcome, found.reason, active.remain)
             return
         arm.hold(arm.tool)  # it stays where it was given up
         active.over = True
         threading.Thread(target=judge, daemon=True).start()
 
-    def end(self, outcome: Outcome, reason: str) -> None:
-        """Ends the goal here and now; the tool is held where it is."""
+    def end(self, outcome: Outcome, reason: str, remain: tuple[float, float] | None = None) -> None:
+        """Ends the goal here and now; the tool is held where it is.
+
+        Args:
+            outcome: of the goal.
+            reason: in words.
+            remain: [m] and [rad] to the goal; left out: from where the arm is now.
+        """
         active = self._goals.active
         assert active is not None
         self._arm.hold(self._arm.tool)
-        self._goals.end(outcome, reason, self._arm.time, self.errors(active))
+        self._goals.end(outcome, reason, self._arm.time, remain or self.errors(active))
 
     def errors(self, active: PursuedGoal) -> tuple[float, float]:
         """What remains to the goal [m] and [rad]; before it begins, from where the tool is."""

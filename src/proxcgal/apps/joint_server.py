@@ -80,6 +80,7 @@ class JointRobotServer(Closing):
         self._thread: threading.Thread | None = None
         self._failure = ""  # of the thread, after which nothing moves any more
         self._ending = threading.Event()
+        self._closed = False
 
     @property
     def robot(self) -> Robot:
@@ -134,8 +135,11 @@ class JointRobotServer(Closing):
 
         Raises:
             GoalRefusedError: not finite, an unknown frame or configuration, one that violates a
-                joint limit, out of reach, another goal executed (where that refuses).
+                joint limit, out of reach, another goal executed (where that refuses), no goal at
+                all, a server that was closed.
         """
+        if not isinstance(goal, JointGoal):
+            raise GoalRefusedError(f"goal = {str(goal)[:80]}: must be a JointGoal")
         with self._lock:
             problems = self._problems(goal)
             if problems:
@@ -209,7 +213,9 @@ class JointRobotServer(Closing):
             return self._arm.reset()
 
     def start(self) -> None:
-        """Makes the ticks in real time, in a thread, until `close`."""
+        """Makes the ticks in real time, in a thread, until `close`. Raises: ConfigError after it."""
+        if self._closed:
+            raise ConfigError("the server was closed: make another one")
         if self._thread is None:
             self._ending.clear()
             self._thread = threading.Thread(target=self._spin, daemon=True)
@@ -217,6 +223,7 @@ class JointRobotServer(Closing):
 
     def close(self) -> None:
         """Ends the thread; a goal that is still executed is aborted at once."""
+        self._closed = True
         self._ending.set()
         if self._thread is not None:
             self._thread.join()
@@ -245,6 +252,8 @@ class JointRobotServer(Closing):
         problems = problems_of(goal, self.robot, configurations)
         if self._second == "refuse" and self._goals.active is not None:
             problems.append(f"goal {self._goals.active.number} is being executed")
+        if self._closed:
+            problems.append("the server was closed: make another one")
         if self._failure:
             problems.append(self._failure)
         if arm.stopped:

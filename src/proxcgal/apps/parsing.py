@@ -51,7 +51,7 @@ def parse(options_type: type, program: str, arguments: Sequence[str]) -> Any:
 
 
 def _refuse_none(options_type: type, arguments: Sequence[str]) -> None:
-    """tyro takes the word None for an option that was left out."""
+    """Tyro takes the word None for an option that was left out."""
     for before, word in zip(["", *arguments], arguments, strict=False):
         name, equals, value = word.partition("=")
         if not (equals and name.startswith("--")):

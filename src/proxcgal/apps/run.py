@@ -91,6 +91,9 @@ def run_command(options: RunOptions, command: str) -> int:
             "--controller: none given, at least one of wb, sm, wb_known, wb_memory is needed"
         )
     workers = checked_workers(options.workers)
+    for name, number, least in (("--seed", options.seed, 0), ("--subject", options.subject, 1)):
+        if number is not None and not least <= number < 2**63:
+            raise ConfigError(f"{name} {number}: must be {least} to {2**63 - 1}")
     if options.subject is not None:
         kind = load_scenario(options.scenario, flat(options.set)).kind
         if kind != "hri":

@@ -32,9 +32,14 @@ def attach(
             for `robot`.
 
     Raises:
-        ModelError: no such link, a pose or prefix that is none, or names that are not unique in
-            the end.
+        ModelError: no robot, no such link, a pose or prefix that is none, or names that are not
+            unique in the end.
     """
+    for name, given in (("robot", robot), ("other", other)):
+        if not isinstance(given, Robot):
+            raise ModelError(
+                f"{name} = {str(given)[:80]!r}: a Robot is needed, as load_robot gives it"
+            )
     prefixes = ("", prefix) if isinstance(prefix, str) else prefix
     texts = isinstance(prefixes, tuple) and all(isinstance(text, str) for text in prefixes)
     if not texts or len(prefixes) != 2:

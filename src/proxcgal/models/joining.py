@@ -76,7 +76,9 @@ def rigid(pose: ArrayLike, what: str) -> Floats:
         T = np.asarray(pose, dtype=np.float64)
     except (TypeError, ValueError):
         raise ModelError(f"{what} = {str(pose)[:80]}; a finite (4, 4) pose is needed") from None
-    if T.shape != (4, 4) or not np.isfinite(T).all():
+    if T.shape == (4, 4) and not np.isfinite(T).all():
+        raise ModelError(f"{what} holds NaN or infinity; a finite (4, 4) pose is needed")
+    if T.shape != (4, 4):
         raise ModelError(f"{what} has shape {T.shape}; a finite (4, 4) pose is needed")
     R = T[:3, :3]
     turns = np.abs(R @ R.T - np.eye(3)).max() < 1e-6 and np.linalg.det(R) > 0

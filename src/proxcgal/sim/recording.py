@@ -55,7 +55,7 @@ class Recording:
         Where that clock jumps, as a fault makes it, a period counts instead. Of a recording that
         holds ticks with scans only, the run's own time.
         """
-        times = np.array([tick.given.time for tick in self.ticks])
+        times: Array = np.array([tick.given.time for tick in self.ticks])
         if self.settings.ticks != "all" or len(times) < 2:
             return times if self.settings.ticks != "all" else np.zeros(len(times))
         period = 1.0 / self.settings.scenario.simulation.control_hz
@@ -63,7 +63,7 @@ class Recording:
         steps[(steps <= 0.0) | (steps > _LONGEST_STEP)] = period
         if np.abs(steps - period).max() < _SAME_STEP:
             return np.arange(len(times), dtype=np.float64) * period
-        return np.r_[0.0, np.cumsum(steps)]
+        return np.concatenate(([0.0], np.cumsum(steps)))
 
     def postures(self) -> Iterator[Array]:
         """(n_q,) of each tick, to draw: the last finite one where a joint state is no number."""

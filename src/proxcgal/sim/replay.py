@@ -7,8 +7,6 @@ import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from proxcgal.errors import ConfigError
 from proxcgal.sim.loop import run_ticks
 from proxcgal.sim.recording import Recording

@@ -37,6 +37,8 @@ CONTROLLERS = ("wb", "sm", "wb_known", "wb_memory")
 #: Those that run where nobody chooses: the paper's, and their ceiling.
 USUAL = ("wb", "sm", "wb_known")
 
+LONGEST = 1e5  #: [s] that a scene may last
+
 
 class Scenario(Section):
     """A scene, a robot with its sensors, and what it is to do."""
@@ -54,11 +56,11 @@ class Scenario(Section):
         1000, ge=0, description="of the controller's meshes, 0: as they are; the simulator's are"
     )
     q0: tuple[float, ...] = Field(min_length=1, description="[rad] or [m] joint positions at 0 s")
-    duration: Positive = Field(description="[s]")
+    duration: Positive = Field(le=LONGEST, description="[s] at most 100000")
     perception: Literal["sensed", "known"] = Field(
         "sensed", description="what the controller gets: scans, or points of the scene itself"
     )
-    seed: int = Field(0, ge=0, description="fixes every random draw")
+    seed: int = Field(0, ge=0, lt=2**63, description="fixes every random draw")
     goal: Goal
     limits: Limits = Field(default_factory=Limits)
     skin: Skin
@@ -188,6 +190,8 @@ def load_scenario(name_or_path: str | Path, overrides: Sequence[str] = ()) -> Sc
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "not a text file"
+        if isinstance(error, IsADirectoryError):
+            reason = "a folder" if str(name_or_path) else "no name"
         if isinstance(error, FileNotFoundError):
             reason = "no built-in scenario has that name, and no file"
         raise ConfigError(

@@ -204,8 +204,10 @@ class Skin(Section):
 class Simulation(Section):
     """Rates, and what the simulated sensors really do."""
 
-    control_hz: Positive = Field(100.0, ge=2, description="ticks a second")
-    sensor_hz: Positive = Field(15.0, description="scans of each sensor a second")
+    control_hz: Positive = Field(100.0, ge=2, le=1e4, description="ticks a second, 2 to 10000")
+    sensor_hz: Positive = Field(
+        15.0, le=1e4, description="scans of each sensor a second, at most 10000"
+    )
     stagger: bool = Field(False, description="sensors take turns instead of measuring at once")
     known_spacing: Positive = Field(
         0.01, description="[m] between known points, along the edges of the scene's surfaces"
@@ -294,7 +296,9 @@ class Fault(Section):
         None, description="of the kind, in its unit; the table below has them"
     )
     axis: Literal["x", "y", "z"] | None = Field(
-        None, description="of the sensor's frame, for mount_offset and mount_turn; left out: drawn"
+        None,
+        description='"x", "y" or "z" of the sensor\'s frame, for mount_offset and mount_turn; '
+        "left out: drawn",
     )
 
     @model_validator(mode="after")

@@ -31,7 +31,7 @@ class Step(Section):
 class Operator(Section):
     """A person in the workspace: drawn from a seed, or played from a recording."""
 
-    subject: Count = Field(1, description="which virtual subject, any number from 1")
+    subject: Count = Field(1, lt=2**63, description="which virtual subject, any number from 1")
     draw: int = Field(0, ge=0, description="seed that the virtual subjects are drawn from")
     recording: str | None = Field(
         None, description="CSV file of a recorded motion, played instead of the timeline's"

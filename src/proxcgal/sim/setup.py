@@ -43,7 +43,8 @@ class Setup:
             ModelError: the robot's description.
         """
         robot = robot or make_robot(scenario)
-        q0 = _start(scenario, robot)
+        require_fit(scenario, robot)
+        q0 = np.array(scenario.start()[1], np.float64)
         return cls(
             scenario=scenario, robot=robot, skin=make_skin(scenario, robot), q0=q0,
             goals=_goals(scenario, robot, q0), scene=scenario.scene(),
@@ -139,14 +140,7 @@ def make_robot(scenario: Scenario) -> Robot:
 def make_skin(scenario: Scenario, robot: Robot) -> _core.Skin:
     """The scenario's sensors on this robot. Raises: ConfigError for a link it does not have."""
     model = _core.SensorModel(**_keys(scenario.skin.sensor))
-    names = robot.link_names
-    unknown = [
-        f"skin.rings.{place}.link = {ring.link!r}: {robot.name} has the links {', '.join(names)}"
-        for place, ring in enumerate(scenario.skin.fitted)
-        if ring.link not in names
-    ]
-    if unknown:
-        raise ConfigError("\n".join(f"scenario {scenario.name}: {line}" for line in unknown))
+    _require(scenario, _unknown_links(scenario, robot))
     skin = _core.Skin([], model)
     for ring in scenario.skin.fitted:
         height: dict[str, Any] = {} if ring.standoff is None else {"standoff": ring.standoff}
@@ -157,11 +151,39 @@ def make_skin(scenario: Scenario, robot: Robot) -> _core.Skin:
     return skin
 
 
-def _start(scenario: Scenario, robot: Robot) -> Array:
+def require_fit(scenario: Scenario, robot: Robot) -> None:
+    """Raises: ConfigError, all that the scenario says of another robot than this, a line each."""
     key, values = scenario.start()
-    if problems := posture_problems(robot, values, key):
+    unknown = [
+        f"controller.avoid_links.{place} = {link!r}: {_links(robot)}"
+        for place, link in enumerate(_avoided(scenario))
+        if link not in robot.link_names
+    ]
+    _require(
+        scenario, posture_problems(robot, values, key) + _unknown_links(scenario, robot) + unknown
+    )
+
+
+def _avoided(scenario: Scenario) -> Sequence[str]:
+    """Links that the scenario names to be kept away; a walk-through has no controller."""
+    return getattr(getattr(scenario, "controller", None), "avoid_links", ())
+
+
+def _unknown_links(scenario: Scenario, robot: Robot) -> list[str]:
+    return [
+        f"skin.rings.{place}.link = {ring.link!r}: {_links(robot)}"
+        for place, ring in enumerate(scenario.skin.fitted)
+        if ring.link not in robot.link_names
+    ]
+
+
+def _links(robot: Robot) -> str:
+    return f"{robot.name} has the links {', '.join(robot.link_names)}"
+
+
+def _require(scenario: Scenario, problems: Sequence[str]) -> None:
+    if problems:
         raise ConfigError("\n".join(f"scenario {scenario.name}: {line}" for line in problems))
-    return np.array(values, np.float64)
 
 
 def posture_problems(robot: Robot, q: Sequence[float], key: str) -> list[str]:

@@ -102,9 +102,9 @@ def checked_token(host: str, port: int, token: str | None) -> str | None:
     """The token that pages must show, with a warning where others than this machine can ask.
 
     Raises:
-        ConfigError: a port that there is not, a token that is too easy to guess.
+        ConfigError: an address or a port that there is not, a token that is too easy to guess.
     """
-    from proxcgal.apps.view.gate import LOOPBACK
+    from proxcgal.apps.view.gate import LOOPBACK, check_free
 
     if not 0 <= port <= 65535:
         raise ConfigError(f"--port {port}: must be 0 to 65535")
@@ -114,6 +114,7 @@ def checked_token(host: str, port: int, token: str | None) -> str | None:
         )
     if host in LOOPBACK:
         return token
+    check_free(host, port)  # no word of who can reach a page that cannot be
     warnings.warn(
         f"--host {host}: others than this machine can reach the page; it is not encrypted, and "
         "whoever knows the token can look on and drag the obstacle",

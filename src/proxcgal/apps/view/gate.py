@@ -73,7 +73,9 @@ class Gate:
         host, upgrade = request.headers.get("Host", ""), _upgrades(request)
         # A page of another site, or a name that was made to point here, must not reach us.
         if self._loopback_only and _name(host) not in LOOPBACK:
-            return self._refuse(f"host {host!r} is not served here: open http://127.0.0.1")
+            return self._refuse(
+                f"host {host!r} is not served here: open http://127.0.0.1:{_port(host)}"
+            )
         origin = request.headers.get("Origin")
         if origin is not None and urllib.parse.urlsplit(origin).netloc != host:
             return self._refuse("pages of other origins may not connect")
@@ -148,7 +150,7 @@ def serve(
         ConfigError: the address cannot be listened on.
     """
     gate = Gate(host, token, bounds)
-    _check_free(host, port)
+    check_free(host, port)
     put_in = threading.Event()
     original = websockets.asyncio.server.serve
 
@@ -241,8 +243,12 @@ def _connections(gate: Gate) -> type[ServerConnection]:
     return Connection
 
 
-def _check_free(host: str, port: int) -> None:
-    """Viser takes the next port where one is taken; a page elsewhere than told helps nobody."""
+def check_free(host: str, port: int) -> None:
+    """Viser takes the next port where one is taken; a page elsewhere than told helps nobody.
+
+    Raises:
+        ConfigError: an address or a port that cannot be listened on.
+    """
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(
             host, port, type=socket.SOCK_STREAM
@@ -267,10 +273,14 @@ def _name(host: str) -> str:
     return urllib.parse.urlsplit(f"//{host}").hostname or ""
 
 
+def _port(host: str) -> int:
+    """The port in a Host header; 0 where it is none."""
+    try:
+        return urllib.parse.urlsplit(f"//{host}").port or 80
+    except ValueError:
+        return 0
+
+
 def _cookie_name(request: Request) -> str:
     """Cookies know no port: pages on two of them keep two."""
-    try:
-        port = urllib.parse.urlsplit(f"//{request.headers.get('Host', '')}").port or 80
-    except ValueError:
-        port = 0
-    return f"proxcgal_{port}"
+    return f"proxcgal_{_port(request.headers.get('Host', ''))}"

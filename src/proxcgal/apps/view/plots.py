@@ -76,7 +76,9 @@ def whole_run(
 
 def _distances(gui: viser.GuiApi, *curves: Curve) -> Any:
     bounds: list[Curve] = [("d_min", _BOUND, (2, 3)), ("d_min + buffer", _BOUND, (2, 3))]
-    return plot(gui, "distance [m], time [s]", HIGHEST, _HEIGHT, *curves, *bounds)
+    return plot(
+        gui, f"distance [m], clipped at {HIGHEST:g}; time [s]", HIGHEST, _HEIGHT, *curves, *bounds
+    )
 
 
 def _activations(gui: viser.GuiApi, *curves: Curve) -> Any:

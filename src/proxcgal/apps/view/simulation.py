@@ -8,6 +8,7 @@ STOP: only whoever started the command begins anew then.
 from __future__ import annotations
 
 import time as clock
+import warnings
 from collections import deque
 from collections.abc import Iterable
 from multiprocessing.connection import Connection
@@ -18,7 +19,7 @@ import numpy as np
 from proxcgal.apps.view.choice import Choice
 from proxcgal.apps.view.exchange import Outbox, Told, Wishes
 from proxcgal.apps.view.stage import Stage
-from proxcgal.errors import ProxError
+from proxcgal.errors import ModelWarning, ProxError
 from proxcgal.sim.live import LiveTrial
 from proxcgal.sim.scenario import Scenario
 from proxcgal.sim.walk.keys import WalkScenario
@@ -37,6 +38,7 @@ def is_walk(scenario: Scenario) -> TypeGuard[WalkScenario]:
 def simulate(link: Connection, scenario: Scenario, controller: str, hz: float = FRAME_HZ) -> None:
     """Runs until the other end of `link` is closed; the target of a process."""
     outbox = Outbox(link)
+    warnings.simplefilter("ignore", ModelWarning)  # the command's own process has told it
     try:
         _Simulation(outbox, link, scenario, controller, hz).run()
     except (EOFError, BrokenPipeError, ConnectionResetError, KeyboardInterrupt):
