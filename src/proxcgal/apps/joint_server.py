@@ -213,7 +213,11 @@ class JointRobotServer(Closing):
             return self._arm.reset()
 
     def start(self) -> None:
-        """Makes the ticks in real time, in a thread, until `close`. Raises: ConfigError after it."""
+        """Makes the ticks in real time, in a thread, until `close`.
+
+        Raises:
+            ConfigError: it was closed.
+        """
         if self._closed:
             raise ConfigError("the server was closed: make another one")
         if self._thread is None:

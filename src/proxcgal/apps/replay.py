@@ -214,7 +214,8 @@ def _compare(recording: Recording, log: TrialLog) -> None:
     row = int(apart.argmax())
     print(
         f"commands: differ from the recorded ones in {np.count_nonzero(apart)} of {len(apart)} "
-        f"ticks, most by {apart[row]:.4f} rad/s at {log.elapsed[row]:.2f} s; the arm moves as recorded"
+        f"ticks, most by {apart[row]:.4f} rad/s at {log.elapsed[row]:.2f} s; the arm moves as "
+        "recorded"
     )
 
 

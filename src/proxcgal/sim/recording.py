@@ -243,4 +243,4 @@ class _Contents:
         if not self._ticks:
             return ", before the first tick"
         lasts = self._ticks[-1].given.time - self._ticks[0].given.time
-        return f", after {len(self._ticks)} ticks, {lasts:.3f} s after the first"
+        return f", after {len(self._ticks)} ticks up to {lasts:.3f} s"
