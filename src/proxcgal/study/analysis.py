@@ -144,6 +144,11 @@ def aligned(rows: Sequence[Sequence[str]], *, left: int, heads: int) -> str:
     return "\n".join(lines)
 
 
+def counted(number: int, noun: str) -> str:
+    """A count for a reader: "1 subject", "2 subjects"."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
 def shown(value: float | None) -> str:
     """A length for a reader [m]: millimetre digits, a dash where there is none."""
     if value is None:

@@ -8,13 +8,14 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from proxcgal.study.analysis import Summary
 from proxcgal.study.fault_rows import DEGRADED, HOLD, MODES, ROWS, RUN, STOP
 from proxcgal.study.figures import DPI, GREY, LEGEND
 
 COLOURS = {DEGRADED: "#E69F00", HOLD: "#0072B2", STOP: "#333333"}
 
 
-def figures(table: pl.DataFrame) -> dict[str, Figure]:
+def figures(table: pl.DataFrame, _: Summary | None = None) -> dict[str, Figure]:
     """Latency of every run, row by row, beside its bound; none where every trial failed."""
     done = table.filter(pl.col("error").is_null())
     robots = done["robot"].unique(maintain_order=True).to_list()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from proxcgal.study.analysis import counted
 from proxcgal.study.fault_rows import RUN, Row
 
 _CONTROLLER = "cpp/tests/test_controller.cpp"
@@ -219,11 +220,12 @@ def page(rows: tuple[Row, ...], summary: dict[str, Any], required: dict[str, str
     """
     robots = summary["robots"]
     lines = [_HEAD]
+    runs_a_row = counted(summary.get("runs", 0), "run")
     runs = sum(found["runs"] for own in robots.values() for found in own.values())
     lines.append(
         f"{summary['right']} of {runs} runs were right: "
         + "; ".join(f"{len(own)} rows on {robot}" for robot, own in robots.items())
-        + f", seeds from {summary.get('seed', 0)} on, {summary.get('runs', '?')} runs a row.\n"
+        + f", seeds from {summary.get('seed', 0)} on, {runs_a_row} a row.\n"
     )
     if failed := len(summary.get("failed", ())):
         lines.append(f"{failed} more runs did not come to their end and are not counted.\n")
