@@ -264,6 +264,28 @@ def test_a_recording_is_no_subject_that_is_drawn(tmp_path: Path) -> None:
             hri.plan(several)
 
 
+def test_a_recorded_person_is_told_and_no_subject(call: Callable[..., Any], tmp_path: Path) -> None:
+    path = tmp_path / "walk.csv"
+    operator = load_scenario("hri_task1").operator  # type: ignore[attr-defined]
+    write_motion(move(draw_subject(1), operator, 1.0), path)
+    words = (
+        "run", "hri_task1", "--controller", "wb", "--no-picture", "--quiet", "--workers", "1",
+        "--out", str(tmp_path / "out"), "--set", "duration=0.5", f'operator.recording="{path}"',
+    )  # fmt: skip
+    assert call(*words).code == 0
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert (summary["subject"], summary["recording"]) == (None, "walk.csv")
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "The person recorded in walk.csv" in page
+    assert "virtual subject" not in page
+    refused = call(*words, "--subject", "3")
+    assert refused.code == 2
+    assert "--subject 3: operator.recording" in refused.err
+    played = load_scenario("hri_task1", [f'operator.recording="{path}"'])
+    assert isinstance(played, HriScenario)
+    assert played.signals() == []  # nobody follows them
+
+
 def test_the_papers_figures_stand_beside_ours(campaign: Any) -> None:
     text = "\n".join(map(str, listings(analyse(table_of(MEANS), campaign))))
     for row, cell in (("Assembly Task 2", PAPER["task2"]), ("first run", PAPER["H3_first"])):

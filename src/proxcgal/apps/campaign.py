@@ -164,6 +164,10 @@ def campaign_command(options: CampaignOptions, command: str) -> int:
             "trials": len(ended), "failed": [_failure(e) for e in failed],
             **kind.analyse(table, campaign), "worst": recorded,
         }  # fmt: skip
+        if kind.shown is not None:
+            summary["moving"] = [
+                {**trial.tags, "controller": trial.controller} for trial in kind.shown(campaign)
+            ]
         for name, figure in kind.figures(table, summary).items():
             write_bytes(folder / name, png(figure))
         for name, text in (kind.pages(summary) if kind.pages else {}).items():

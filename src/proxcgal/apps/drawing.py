@@ -32,8 +32,7 @@ def draw_figures(scenario: Scenario, logs: Sequence[TrialLog], folder: Path, rep
     signals: Signals = ()
     if isinstance(scenario, HriScenario):
         signals = scenario.signals()
-        if scenario.operator.recording is None:
-            title += f", subject {scenario.operator.subject}"
+        title += f", {scenario.operator.who}"
     figure = time_figure(logs, title=title, d_min=law.d_min, buffer=law.buffer, signals=signals)
     write_bytes(folder / "distance.png", png(figure))
     report(0.5)
@@ -55,12 +54,17 @@ def _draw_pairs(scenario: Scenario, logs: Sequence[TrialLog], folder: Path) -> s
     elapsed = float(log.elapsed[tick])
     points_W = setup.known_cloud()(elapsed)
     q, drawn = log.q[tick], setup.known_cloud(DRAWN_SPACING_M)(elapsed)
-    views = [
-        whole_body_view(setup.robot, q, points_W, drawn_W=drawn, title="whole body (WB)"),
-        sensor_view(
-            setup.robot, setup.skin, q, points_W, drawn_W=drawn, title="sensor points (SM)"
-        ),
-    ]
+    views = []
+    if any(each.controller != "sm" for each in logs):
+        views.append(
+            whole_body_view(setup.robot, q, points_W, drawn_W=drawn, title="whole body (WB)")
+        )
+    if any(each.controller == "sm" for each in logs):
+        views.append(
+            sensor_view(
+                setup.robot, setup.skin, q, points_W, drawn_W=drawn, title="sensor points (SM)"
+            )
+        )
     title = (
         f"{scenario.name}: closest pairs on one posture ({log.controller}, {log.time[tick]:.1f} s)"
     )

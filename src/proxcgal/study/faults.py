@@ -236,5 +236,6 @@ KIND = Kind(
     "follows, how soon, and whether the arm recovers. Engineering figures from a simulation, not a "
     "certificate.",
     plan=plan, analyse=analyse, listings=listings, verdicts=verdicts, figures=figures,
-    captions=captions, worst=worst, worst_of="all runs: the wrong ones, then the slowest", pages=pages,
+    captions=captions, worst=worst, pages=pages,
+    worst_of="all runs: the wrong ones, then the slowest",
 )  # fmt: skip

@@ -49,6 +49,7 @@ def plan(wishes: Wishes) -> Campaign:
     redrawn: Counter[str] = Counter()
     scenes: dict[str, str] = {}
     phases: dict[str, str] = {}  # which scene has each
+    recordings: list[str] = []
     compared: list[str] = []  # rows of the paper's tables
     keys = [assignment.partition("=")[0].strip() for assignment in wishes.overrides]
     for key in ("seed", "operator.subject", "operator.draw"):
@@ -74,6 +75,8 @@ def plan(wishes: Wishes) -> Campaign:
                 "is always the same, in the same place: needs --subjects 1 --no-jitter"
             )
         scenes |= identity(base, robot)
+        if base.operator.recording is not None and base.operator.who not in recordings:
+            recordings.append(base.operator.who)
         compared += [task, *base.windows()] if is_the_papers(base) else []
         for jitter in (False, True) if wishes.jitter else (False,):
             for subject in range(1, wishes.runs + 1):
@@ -104,7 +107,10 @@ def plan(wishes: Wishes) -> Campaign:
     settings = _plain_settings(trials[0].scenario.controller.model_dump(mode="json"))
     return Campaign(
         description=description, trials=trials, perform=perform, columns=COLUMNS,
-        notes={"redrawn": dict(sorted(redrawn.items())), "settings": settings, "compared": compared},
+        notes={
+            "redrawn": dict(sorted(redrawn.items())), "settings": settings, "compared": compared,
+            "recordings": recordings,
+        },
     )  # fmt: skip
 
 

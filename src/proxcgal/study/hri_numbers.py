@@ -51,6 +51,7 @@ def analyse(table: pl.DataFrame, campaign: Campaign) -> Summary:
         "jittered": None if jittered.is_empty() else _layout(jittered),
         "redrawn": campaign.notes["redrawn"],
         "settings": campaign.notes["settings"],
+        "recordings": campaign.notes["recordings"],
         "compared": campaign.notes["compared"],
         "self_min_m": done["self_min_m"].min(),
         "self_under_limit": int((done["self_min_m"] < SELF_LIMIT_M).sum()),

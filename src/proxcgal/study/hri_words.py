@@ -192,7 +192,7 @@ def _velocity(summary: Summary, name: str) -> str:
 
 def verdicts(summary: Summary) -> list[str]:
     """What holds of the experiment's bounds and what does not; what else is to be known."""
-    told = []
+    told: list[str] = []
     for layout, numbers in _layouts(summary):
         told += _apart(summary, layout, numbers)
         for what, holds, figures in held(numbers, compared(summary)):
@@ -224,15 +224,15 @@ def verdicts(summary: Summary) -> list[str]:
         )
     if summary["subjects"] < _FEW:
         told.append(
-            f"With fewer than {_FEW} subjects there is no verdict: their intervals say little about "
-            "others, however narrow."
+            f"With fewer than {_FEW} subjects there is no verdict: their intervals say little "
+            "about others, however narrow."
         )
     redrawn = ", ".join(f"{reason} {n}" for reason, n in summary["redrawn"].items())
     told.append(
         f"{counted(summary['subjects'], 'subject')}; "
         + (f"moved cells drawn again: {redrawn or 'none'}. " if summary["jittered"] else "")
-        + f"One core simulated {summary['simulated_s'] / max(summary['wall_s'], 1e-9):.1f} times faster than "
-        "real time."
+        + f"One core simulated {summary['simulated_s'] / max(summary['wall_s'], 1e-9):.1f} times "
+        "faster than real time."
     )
     return told
 
@@ -261,16 +261,23 @@ def _apart(summary: Summary, layout: str, numbers: Summary) -> Iterator[str]:
 def introduction(summary: Summary) -> str:
     """What was done, and what each controller that ran moves and is given."""
     names = list(summary["close_calls"])
-    cells = "once in the cell as it is and once with all its positions moved at random"
+    cells = "in the cell as it is"
+    if summary["jittered"]:
+        cells = "once in the cell as it is and once with all its positions moved at random"
+    recorded = ", ".join(summary.get("recordings", ()))
+    who = (
+        f"The person recorded in {recorded} moves"
+        if recorded
+        else ("Virtual subjects walk in, fetch tools and assemble at a car door")
+    )
     told = [
-        "Virtual subjects walk in, fetch tools and assemble at a car door while the arm goes back "
-        "and forth before it. Every controller meets the same subjects with the same noise of the "
-        f"sensors, {cells if summary['jittered'] else 'in the cell as it is'}."
+        f"{who} while the arm goes back and forth. Every controller meets the same subjects with "
+        f"the same noise of the sensors, {cells}."
     ]
     if any(key not in compared(summary) for key in _rows(summary)):
         told.append(
-            "The paper's figures stand beside those rows alone whose cell is the paper's, hri_task1 "
-            "or hri_task2 as they are built in."
+            "The paper's figures stand beside those rows alone whose cell is the paper's, "
+            "hri_task1 or hri_task2 as they are built in."
             if compared(summary)
             else "No row is compared with the paper: none of these cells is hri_task1 or hri_task2 "
             "as they are built in."
@@ -291,6 +298,17 @@ _MOVES = {
 }
 
 
+def _moving(summary: Summary) -> str:
+    """Which trials the moving picture shows."""
+    trials = summary.get("moving")
+    if not trials:
+        return "One of the trials"
+    names = " and ".join(trial["controller"] for trial in trials)
+    recorded = summary.get("recordings")
+    whose = ", ".join(recorded) if recorded else f"subject {trials[0]['subject']}"
+    return f"{_ROWS.get(trials[0]['task'], trials[0]['task'])}, {whose}, {names}"
+
+
 def captions(summary: Summary) -> dict[str, str]:
     """What the figures show."""
     paper = bool(compared(summary))
@@ -308,7 +326,7 @@ def captions(summary: Summary) -> dict[str, str]:
         "differences.png": "Paired differences of the true means, subject by subject (dots), with "
         f"their mean and its 95 % bootstrap interval, {moved}"
         + ("; crosses: the paper's difference." if paper else "."),
-        "motion.gif": "One of the trials, in motion: red, the filtered cloud; blue, points that "
+        "motion.gif": f"{_moving(summary)}, in motion: red, the filtered cloud; blue, points that "
         "were taken for the arm itself and removed; green, the pair that the avoidance acts on; "
         "axes, the way point that is due.",
     }
