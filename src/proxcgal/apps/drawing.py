@@ -25,6 +25,7 @@ MOVING = ("wb", "sm")  # whose recordings the moving picture shows, side by side
 
 def draw_figures(scenario: Scenario, logs: Sequence[TrialLog], folder: Path, report: Report) -> str:
     """Draws `distance.png` and, where a posture shows a pair, `pairs.png`; what was drawn."""
+    from proxcgal.sim.setup import Setup
     from proxcgal.study.figures import png, time_figure
 
     law = scenario.controller
@@ -33,7 +34,11 @@ def draw_figures(scenario: Scenario, logs: Sequence[TrialLog], folder: Path, rep
     if isinstance(scenario, HriScenario):
         signals = scenario.signals()
         title += f", {scenario.operator.who}"
-    figure = time_figure(logs, title=title, d_min=law.d_min, buffer=law.buffer, signals=signals)
+    figure = time_figure(
+        logs, title=title, d_min=law.d_min, buffer=law.buffer, signals=signals,
+        links=Setup.of(scenario).robot.link_names,
+        faults=[(f.start, scenario.duration if f.end is None else f.end) for f in scenario.faults],
+    )  # fmt: skip
     write_bytes(folder / "distance.png", png(figure))
     report(0.5)
     return f"{scenario.name}: distance.png" + _draw_pairs(scenario, logs, folder)

@@ -32,10 +32,16 @@ def figures(table: pl.DataFrame, _: Summary | None = None) -> dict[str, Figure]:
             latency = own["latency_ms"].drop_nulls().to_numpy()
             spread = np.linspace(-0.25, 0.25, len(latency))
             ax.plot(
-                latency, height + spread, ".", color=COLOURS[row.least], markersize=4, alpha=0.6
+                latency,
+                height + spread,
+                ".",
+                color=COLOURS[row.least],
+                markersize=4,
+                alpha=0.6,
+                zorder=3,
             )
             ax.plot(
-                [1000 * row.within] * 2, [height - 0.4, height + 0.4], color=GREY, lw=2, zorder=1
+                [1000 * row.within] * 2, [height - 0.4, height + 0.4], color=GREY, lw=1.2, zorder=1
             )
         ax.set_title(robot)
         ax.set_xlabel("time to the required mode [ms]")

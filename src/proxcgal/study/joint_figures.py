@@ -33,7 +33,7 @@ _TASKS = {
 }
 #: Curves of distance: what the arm was given, its colour, its name.
 _SEEN = {
-    "known": ("#009E73", "known"),
+    "known": ("#6A3D9A", "known"),
     "sensed": ("#0072B2", "sensed"),
     "memory": ("#CC79A7", "sensed with memory"),
 }
