@@ -229,8 +229,8 @@ def verdicts(summary: Summary) -> list[str]:
         )
     redrawn = ", ".join(f"{reason} {n}" for reason, n in summary["redrawn"].items())
     told.append(
-        f"{counted(summary['subjects'], 'subject')}; "
-        + (f"moved cells drawn again: {redrawn or 'none'}. " if summary["jittered"] else "")
+        f"{counted(summary['subjects'], 'subject')}. "
+        + (f"Moved cells drawn again: {redrawn or 'none'}. " if summary["jittered"] else "")
         + f"One core simulated {summary['simulated_s'] / max(summary['wall_s'], 1e-9):.1f} times "
         "faster than real time."
     )
