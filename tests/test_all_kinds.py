@@ -35,7 +35,7 @@ def test_a_campaign_of_which_every_trial_fails_is_summed_up_all_the_same(name: s
     for listing in kind.listings(summary):
         assert str(listing)
     assert not any("none violated" in sentence for sentence in kind.verdicts(summary))
-    for figure in kind.figures(table).values():
+    for figure in kind.figures(table, summary).values():
         assert png(figure)
     assert isinstance(kind.captions(summary), dict)
     if kind.pages is not None:

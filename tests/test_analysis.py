@@ -3,12 +3,15 @@
 import errno
 import io
 import json
+import warnings
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -36,6 +39,7 @@ def make_log(controller: str = "wb", end: float = 0.25, **changes: Any) -> Any:
         seen_m=seen,
         activation=np.clip((0.3 - true) / 0.1, 0.0, 1.0),
         control_link=list(link),
+        mode=np.zeros(len(time), int),
         own_m=0.12,
         coverage=Coverage(0.5, 0.25, 0.25, 0.0),
     )
@@ -158,7 +162,49 @@ def test_the_table_has_a_line_a_trial_and_the_gain_beside_wb(both: list[Any]) ->
     lines = analysis.table([analysis.static_summary(both)]).splitlines()
     assert len(lines) == 2 + 1 + 2
     wb = next(line for line in lines if " wb " in line)
-    assert wb.split() == ["front_plane", "wb", "0.250", "0.250", "0.260", "0.400", "+220"]
+    assert wb.split() == ["front_plane", "wb", "0.250", "0.250", "0.260", "0.400", "0", "+220"]
+
+
+def test_the_table_counts_violations_where_there_are_any(both: list[Any]) -> None:
+    assert "violations" not in analysis.table([analysis.static_summary(both[:1])])
+    summary = analysis.static_summary(both)
+    lines = analysis.table([summary]).splitlines()
+    assert "violations" in lines[0]
+    told = str(summary["controllers"]["sm"]["violations"])
+    assert next(line for line in lines if " sm " in line).split()[-1] == told != "0"
+
+
+def test_a_links_colour_is_the_same_in_every_run() -> None:
+    links = ["base", "elbow", "wrist"]
+
+    def colours(*held: str) -> dict[str, Any]:
+        log = make_log(control_link=[held[0]] * 300 + [held[-1]] * 300)
+        figure = figures.time_figure([log], title="", d_min=0.2, buffer=0.1, links=links)
+        found = [patch.get_facecolor() for patch in figure.axes[2].patches]
+        found += [each.get_facecolor()[0] for each in figure.axes[2].collections]
+        return dict(zip(held, map(tuple, found), strict=False))
+
+    one, other = colours("elbow", "wrist"), colours("wrist", "base")
+    assert one["wrist"] == other["wrist"]
+    assert len({*one.values(), *other.values()}) == 3
+
+
+def test_modes_and_faults_are_drawn_with_a_legend_where_there_are_any() -> None:
+    calm, held = make_log(), make_log(mode=np.r_[np.zeros(300, int), np.full(300, 2)])
+    plain = figures.time_figure([calm], title="", d_min=0.2, buffer=0.1)
+    assert len(plain.axes) == 3
+    figure = figures.time_figure([held], title="", d_min=0.2, buffer=0.1, faults=[(2.5, 4.0)])
+    assert figure.axes[3].get_ylabel() == "mode"
+    (legend,) = [each for each in figure.axes[0].artists if isinstance(each, Legend)]
+    assert [text.get_text() for text in legend.get_texts()] == ["HOLD", "fault"]
+
+
+def test_figures_of_short_runs_print_no_notes_of_their_layout() -> None:
+    figure = Figure(figsize=(0.4, 0.4), layout="constrained")
+    figure.subplots().set_ylabel("a label that is longer than the figure is high")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        figures.png(figure)
 
 
 def pixels(figure: Any) -> NDArray[np.uint8]:

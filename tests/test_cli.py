@@ -22,6 +22,7 @@ from proxcgal.apps.drawing import draw_motion
 from proxcgal.apps.replay import ReplayOptions, opens_page
 from proxcgal.sim.recording import read_recording
 from proxcgal.sim.scenario import load_scenario
+from proxcgal.sim.setup import Setup
 from proxcgal.study import motion
 
 QUICK = ["--set", "duration=0.4", "--quiet"]
@@ -326,6 +327,19 @@ def test_the_moving_picture_shows_both_controllers(
     assert {path.name for path in tmp_path.iterdir()} == {
         "wb.mcap", "sm.mcap", "motion.gif", "motion.png",
     }  # fmt: skip
+
+
+def test_beside_a_person_the_still_shows_the_least_distance_of_all_runs(
+    results: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recordings = [read_recording(results / name) for name in ("wb.mcap", "sm.mcap")]
+    true = [[tick.truth.distance for tick in each.ticks] for each in recordings]
+    run, row = np.unravel_index(int(np.argmin(true)), np.shape(true))
+    setup = Setup.of(recordings[0].settings.scenario)
+    end = recordings[0].ticks[-1].given.time
+    assert motion._telling(setup, recordings) == (end, -1)
+    monkeypatch.setattr(motion, "HriScenario", type(setup.scenario))
+    assert motion._telling(setup, recordings) == (recordings[run].ticks[row].given.time, run)
 
 
 def test_without_a_way_to_draw_a_run_keeps_its_numbers(

@@ -21,7 +21,7 @@ from proxcgal.study.campaign import Trial
 from proxcgal.study.fault_rows import DEGRADED, HOLD, ROWS, RUN, STOP
 from proxcgal.study.faults import KIND, perform, plan
 from proxcgal.study.kind import Wishes
-from proxcgal.study.reliability import GOALS
+from proxcgal.study.reliability import GOALS, page
 from proxcgal.study.reliability import SHOWN as SHOWN_BY_TESTS
 
 SHOWN = (
@@ -177,6 +177,18 @@ def test_the_page_has_the_campaigns_rows_and_no_other() -> None:
 def test_every_test_that_the_page_names_exists() -> None:
     for file, name in {test for entry in (*SHOWN_BY_TESTS, *GOALS) for test in entry.tests}:
         assert re.search(rf"\b{re.escape(name)}\b", (ROOT / file).read_text()), f"{file} {name}"
+
+
+def test_a_page_of_few_runs_claims_no_goal_and_has_no_link_that_leads_nowhere() -> None:
+    summary = {"robots": {}, "right": 0, "runs": 1}
+    assert "## Goals" not in page(ROWS, summary, {})
+    assert "## Goals" in page(ROWS, summary | {"runs": 200}, {})
+    assert "](" not in page(ROWS, summary | {"runs": 200}, {})
+
+
+def test_a_scenario_of_another_kind_is_refused_by_its_kind() -> None:
+    with pytest.raises(ConfigError, match=r'--scenario hri_task1: kind = "hri": .*"static"'):
+        plan(Wishes(runs=1, seed=0, scenarios=("hri_task1",)))
 
 
 def test_a_run_too_short_to_show_that_the_arm_recovers_is_refused() -> None:

@@ -20,7 +20,7 @@ from proxcgal.sim.trial_log import sampled_ticks
 from proxcgal.study import hri
 from proxcgal.study.hri_figures import figures
 from proxcgal.study.hri_numbers import PAPER, analyse, held
-from proxcgal.study.hri_words import captions, listings, verdicts
+from proxcgal.study.hri_words import captions, introduction, listings, verdicts
 from proxcgal.study.kind import Wishes
 from proxcgal.study.layouts import JITTER_M, draw_layout
 from proxcgal.study.trials import robot_of
@@ -171,6 +171,13 @@ def test_the_tables_are_those_of_the_trials(campaign: Any) -> None:
     assert summary["wall_s"] == pytest.approx(1.5 * 12)
 
 
+#: Twice as many subjects: enough for a verdict.
+SIX = {
+    name: means | {subject + 3: mean for subject, mean in means.items()}
+    for name, means in MEANS.items()
+}
+
+
 def test_bounds_hold_or_do_not_as_the_numbers_say(campaign: Any) -> None:
     good = analyse(table_of(MEANS), campaign)
     assert all(holds for _, holds, _ in held(good))
@@ -178,7 +185,60 @@ def test_bounds_hold_or_do_not_as_the_numbers_say(campaign: Any) -> None:
     failed = {what for what, holds, _ in held(turned) if not holds}
     assert "task2: wb >= sm" in failed
     assert "H3_first: interval above -5 mm" in failed
-    assert any("DOES NOT HOLD" in sentence for sentence in verdicts(turned))
+    assert not any("HOLD" in sentence for sentence in verdicts(turned))  # of three subjects
+    six = analyse(table_of({"wb": SIX["sm"], "sm": SIX["wb"]}), campaign)
+    assert any("DOES NOT HOLD" in sentence for sentence in verdicts(six))
+
+
+def test_every_row_has_its_sentence_with_a_bound_or_without(campaign: Any) -> None:
+    summary = analyse(table_of(SIX), campaign)
+    told = [text for text in verdicts(summary) if text.startswith("main: ")]
+    assert any("Assembly Task 2, mean true distance: wb is farther off" in text for text in told)
+    assert any("Task 2, least true distance: wb is farther off" in text for text in told)
+    few = verdicts(analyse(table_of(MEANS), campaign))
+    assert any("3 pairs, too few to tell wb and sm apart" in text for text in few)
+
+
+@pytest.mark.parametrize(
+    ("changed", "rows"),
+    [
+        ((), ["task1", "H1", "H2"]),
+        (("controller.d_min=0.25", "simulation.dropout=0.1"), ["task1", "H1", "H2"]),
+        (("operator.places.H1=[1.0, 0.45, 0.3]",), []),
+        (("duration=60.0",), []),
+    ],
+)
+def test_only_the_papers_own_cell_is_compared_with_the_paper(
+    changed: tuple[str, ...], rows: list[str], tmp_path: Path
+) -> None:
+    path = tmp_path / "hri_task1.toml"
+    path.write_text(load_scenario("hri_task1", changed).to_toml())
+    wishes = Wishes(runs=1, seed=0, jitter=False, scenarios=(str(path),), controllers=("wb",))
+    assert hri.plan(wishes).notes["compared"] == rows
+
+
+def test_rows_of_another_cell_have_no_figures_of_the_paper(campaign: Any) -> None:
+    table = table_of(MEANS)
+    summary = analyse(table, campaign) | {"compared": []}
+    (first,) = [each for each in listings(summary) if each.caption.startswith("Table I,")][:1]
+    assert {(row[4], row[5], row[6]) for row in first.rows} == {("-", "-", "-")}
+    assert not any("paper's +" in text or "wb >= sm" in text for text in verdicts(summary))
+    assert "No row is compared with the paper" in introduction(summary)
+    assert not any("paper" in text for name, text in captions(summary).items()
+                   if name != "trials.png")  # fmt: skip
+    drawn = figures(table, summary)
+    for name in ("subjects.png", "differences.png"):
+        assert not [line for line in drawn[name].axes[0].lines if line.get_marker() == "x"]
+
+
+def test_the_introduction_tells_what_ran(campaign: Any) -> None:
+    table = table_of(MEANS)
+    both = introduction(analyse(table, campaign))
+    assert "moved at random" in both
+    assert "wb_known" not in both
+    main = analyse(table.filter(pl.col("layout") == "main"), campaign)
+    assert "moved" not in introduction(main)
+    assert "moved" not in captions(main)["differences.png"]
 
 
 def test_the_same_phase_in_two_scenes_is_refused(tmp_path: Path) -> None:
@@ -202,6 +262,28 @@ def test_a_recording_is_no_subject_that_is_drawn(tmp_path: Path) -> None:
     ):
         with pytest.raises(ConfigError, match=r"operator\.recording .* --subjects 1 --no-jitter"):
             hri.plan(several)
+
+
+def test_a_recorded_person_is_told_and_no_subject(call: Callable[..., Any], tmp_path: Path) -> None:
+    path = tmp_path / "walk.csv"
+    operator = load_scenario("hri_task1").operator  # type: ignore[attr-defined]
+    write_motion(move(draw_subject(1), operator, 1.0), path)
+    words = (
+        "run", "hri_task1", "--controller", "wb", "--no-picture", "--quiet", "--workers", "1",
+        "--out", str(tmp_path / "out"), "--set", "duration=0.5", f'operator.recording="{path}"',
+    )  # fmt: skip
+    assert call(*words).code == 0
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert (summary["subject"], summary["recording"]) == (None, "walk.csv")
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "The person recorded in walk.csv" in page
+    assert "virtual subject" not in page
+    refused = call(*words, "--subject", "3")
+    assert refused.code == 2
+    assert "--subject 3: operator.recording" in refused.err
+    played = load_scenario("hri_task1", [f'operator.recording="{path}"'])
+    assert isinstance(played, HriScenario)
+    assert played.signals() == []  # nobody follows them
 
 
 def test_the_papers_figures_stand_beside_ours(campaign: Any) -> None:

@@ -1,6 +1,7 @@
 """Jobs side by side: results in order, errors told, no worker left behind."""
 
 import functools
+import gc
 import os
 import signal
 import time
@@ -140,3 +141,10 @@ def test_a_worker_that_dies_is_told_as_such(jobs: ModuleType) -> None:
 def test_no_more_workers_than_jobs() -> None:
     assert default_workers(1) == 1
     assert default_workers(10**6) >= 1
+
+
+def test_an_address_that_is_none_leaves_no_half_made_client() -> None:
+    pytest.importorskip("distributed")
+    with pytest.raises(px.ConfigError, match="--cluster foo: no scheduler answers there"):
+        Pool(1, "foo")
+    assert not [each for each in gc.get_objects() if type(each).__name__ == "Client"]

@@ -220,3 +220,18 @@ def test_what_is_no_folder_of_results_is_refused(
 def test_a_missing_folder_is_named(tmp_path: Path) -> None:
     with pytest.raises(px.ConfigError, match="no such folder"):
         write_report(tmp_path / "nowhere")
+
+
+def test_only_controllers_that_ran_are_explained(tmp_path: Path) -> None:
+    text = write_report(make_run(tmp_path / "out")).read_text()
+    assert "<code>sm</code>, the baseline" in text
+    assert "wb_known" not in text
+    assert "wb_memory" not in text
+
+
+def test_the_moving_pictures_caption_tells_how_near_the_arms_came(tmp_path: Path) -> None:
+    folder = make_run(tmp_path / "out")
+    (folder / "motion.gif").write_bytes(PIXEL)
+    text = write_report(folder).read_text()
+    assert "least true distance: wb 0.218 m, sm 0.054 m" in text
+    assert "backing away" not in text

@@ -102,7 +102,8 @@ class CampaignOptions:
     cluster: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS", help_behavior_hint="")] = None
     """A dask.distributed scheduler, whose workers simulate instead; each with --nthreads 1."""
     keep: Annotated[str, tyro.conf.arg(metavar="worst:N|none")] = "worst:5"
-    """Trials to record, in DIR/recordings: the ticks that brought scans, to step through."""
+    """Trials to record, in DIR/recordings: the ticks that brought scans, to step through. Of static
+    and hri those of wb alone, of hri in the cell as it is: there may be fewer than N."""
     no_picture: Flag = False
     """Leave the moving picture out, where the kind has one."""
     every_tick: Flag = False
@@ -163,7 +164,11 @@ def campaign_command(options: CampaignOptions, command: str) -> int:
             "trials": len(ended), "failed": [_failure(e) for e in failed],
             **kind.analyse(table, campaign), "worst": recorded,
         }  # fmt: skip
-        for name, figure in kind.figures(table).items():
+        if kind.shown is not None:
+            summary["moving"] = [
+                {**trial.tags, "controller": trial.controller} for trial in kind.shown(campaign)
+            ]
+        for name, figure in kind.figures(table, summary).items():
             write_bytes(folder / name, png(figure))
         for name, text in (kind.pages(summary) if kind.pages else {}).items():
             write_text(folder / name, text)
@@ -275,7 +280,10 @@ def _print(kind: Kind, summary: dict[str, Any], folder: Path) -> None:
     for sentence in kind.verdicts(summary):
         print(sentence)
     if summary["worst"]:
-        print("\nThe worst, recorded; what steps through each, and what runs it again:")
+        print(
+            f"\nThe worst of {kind.worst_of}, recorded; what steps through each, and what runs it "
+            "again:"
+        )
     for entry in summary["worst"]:
         if "error" in entry:
             print(f"proxcgal: {entry['name']}: not recorded: {entry['error']}", file=sys.stderr)

@@ -45,7 +45,8 @@ def campaign_page(stored: StoredCampaign) -> str:
 
 def _parts(kind: Kind, stored: StoredCampaign) -> Iterator[str]:
     summary = stored.summary
-    yield f"<p>{escape(kind.introduction)}</p>"
+    told = kind.introduction
+    yield f"<p>{escape(told if isinstance(told, str) else told(summary))}</p>"
     for sentence in kind.verdicts(summary):
         yield f"<p>{escape(sentence)}</p>"
     for listing in kind.listings(summary):
@@ -57,7 +58,7 @@ def _parts(kind: Kind, stored: StoredCampaign) -> Iterator[str]:
         part, used = picture(stored.folder / Path(name).name, caption, budget)
         budget -= used
         yield part
-    yield from _commands(stored, worst)
+    yield from _commands(stored, worst, kind.worst_of)
     yield from origin_part(stored.about)
     yield from replays.parts()
 
@@ -89,10 +90,11 @@ def _replay_of_worst(stored: StoredCampaign, replays: Replays) -> str:
     return ""
 
 
-def _commands(stored: StoredCampaign, replay: str) -> Iterator[str]:
+def _commands(stored: StoredCampaign, replay: str, worst_of: str) -> Iterator[str]:
     """What steps through the worst trials, and what runs them and the failed ones again."""
     if stored.summary["worst"]:
         yield "<h2>The worst</h2>"
+        yield f"<p>Of {escape(worst_of)}.</p>"
         yield replay
     for entry in stored.summary["worst"]:
         if "error" in entry:

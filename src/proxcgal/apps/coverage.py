@@ -111,10 +111,14 @@ def coverage_command(options: CoverageOptions, command: str) -> int:
     print(
         f"{scenario.name}, {options.controller}, {stamps[-1]:.1f} s: of the volume within "
         f"{REACH_M:g} m of the arm {100 * shares['not_in_view']:.0f} % is not in view, "
-        f"{100 * shares['not_within_memory']:.0f} % was not for {memory_s:g} s, "
-        f"{100 * shares['never_seen']:.0f} % never was"
+        + (
+            f"{100 * shares['not_within_memory']:.0f} % was not for {memory_s:g} s, "
+            if stamps[-1] > memory_s
+            else ""
+        )
+        + f"{100 * shares['never_seen']:.0f} % never was since the run began"
     )
     for line in coverage_lines(scenario.name, {options.controller: numbers}):
-        print(line)
+        print(f"{line}, over the whole run of {scenario.duration:g} s")
     print(folder / "coverage.png")
     return 0

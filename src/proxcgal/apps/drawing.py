@@ -25,6 +25,7 @@ MOVING = ("wb", "sm")  # whose recordings the moving picture shows, side by side
 
 def draw_figures(scenario: Scenario, logs: Sequence[TrialLog], folder: Path, report: Report) -> str:
     """Draws `distance.png` and, where a posture shows a pair, `pairs.png`; what was drawn."""
+    from proxcgal.sim.setup import Setup
     from proxcgal.study.figures import png, time_figure
 
     law = scenario.controller
@@ -32,9 +33,12 @@ def draw_figures(scenario: Scenario, logs: Sequence[TrialLog], folder: Path, rep
     signals: Signals = ()
     if isinstance(scenario, HriScenario):
         signals = scenario.signals()
-        if scenario.operator.recording is None:
-            title += f", subject {scenario.operator.subject}"
-    figure = time_figure(logs, title=title, d_min=law.d_min, buffer=law.buffer, signals=signals)
+        title += f", {scenario.operator.who}"
+    figure = time_figure(
+        logs, title=title, d_min=law.d_min, buffer=law.buffer, signals=signals,
+        links=Setup.of(scenario).robot.link_names,
+        faults=[(f.start, scenario.duration if f.end is None else f.end) for f in scenario.faults],
+    )  # fmt: skip
     write_bytes(folder / "distance.png", png(figure))
     report(0.5)
     return f"{scenario.name}: distance.png" + _draw_pairs(scenario, logs, folder)
@@ -55,12 +59,17 @@ def _draw_pairs(scenario: Scenario, logs: Sequence[TrialLog], folder: Path) -> s
     elapsed = float(log.elapsed[tick])
     points_W = setup.known_cloud()(elapsed)
     q, drawn = log.q[tick], setup.known_cloud(DRAWN_SPACING_M)(elapsed)
-    views = [
-        whole_body_view(setup.robot, q, points_W, drawn_W=drawn, title="whole body (WB)"),
-        sensor_view(
-            setup.robot, setup.skin, q, points_W, drawn_W=drawn, title="sensor points (SM)"
-        ),
-    ]
+    views = []
+    if any(each.controller != "sm" for each in logs):
+        views.append(
+            whole_body_view(setup.robot, q, points_W, drawn_W=drawn, title="whole body (WB)")
+        )
+    if any(each.controller == "sm" for each in logs):
+        views.append(
+            sensor_view(
+                setup.robot, setup.skin, q, points_W, drawn_W=drawn, title="sensor points (SM)"
+            )
+        )
     title = (
         f"{scenario.name}: closest pairs on one posture ({log.controller}, {log.time[tick]:.1f} s)"
     )

@@ -12,6 +12,7 @@ from proxcgal.apps.document import (
     origin_part,
     picture,
 )
+from proxcgal.apps.drawing import MOVING
 from proxcgal.apps.replays import Replays
 from proxcgal.apps.stored import About, Numbers, Run
 from proxcgal.study.analysis import COVERAGE_KEYS, SELF_LIMIT_M, shown
@@ -26,15 +27,14 @@ PICTURES = (
     ),
     (
         "pairs.png",
-        "The two controllers' closest pairs on the same posture. Left: any point of the arm's "
-        "surface may be the control point. Right: only the sensors' mounting points. Blue: the "
-        "obstacle. Red: the pair.",
+        "Closest pairs on the posture at which the first of the controllers was nearest. WB: any "
+        "point of the arm's surface may be the control point. SM: only the sensors' mounting "
+        "points. Blue: the obstacle. Red: the pair.",
     ),
     (
         "motion.gif",
-        "The arm backing away. Red: the filtered cloud. Blue: points that were taken for the arm "
-        "itself and removed. Green: the pair that the avoidance acts on. The axes beyond the "
-        "obstacle: the goal.",
+        "Red: the filtered cloud. Blue: points that were taken for the arm itself and removed. "
+        "Green: the pair that the avoidance acts on. The axes: the goal.",
     ),
 )
 PAPER = {
@@ -74,7 +74,7 @@ def _parts(runs: Sequence[Run], about: About) -> Iterator[str]:
             yield f"<p>{escape(_sentence(run.about.description))}</p>"
         if _beside_a_person(run):
             yield from _phases(run)
-        for name, caption in PICTURES:
+        for name, caption in _pictures(run):
             part, used = picture(run.folder / name, caption, budget)
             budget -= used
             yield part
@@ -92,25 +92,53 @@ def _parts(runs: Sequence[Run], about: About) -> Iterator[str]:
     yield from replays.parts()
 
 
+def _pictures(run: Run) -> Iterator[tuple[str, str]]:
+    """File and caption; of the moving picture with how near each arm came."""
+    for name, caption in PICTURES:
+        if name == "motion.gif":
+            least = {
+                controller: run.summary.controllers[controller].true_min_m
+                for controller in MOVING
+                if controller in run.summary.controllers
+            }
+            told = [f"{c} {shown(value)} m" for c, value in least.items() if value is not None]
+            start = "The arm in motion" + (f"; least true distance: {', '.join(told)}" * bool(told))
+            yield name, f"{start}. {caption}"
+        else:
+            yield name, caption
+
+
 def _introduction(runs: Sequence[Run]) -> Iterator[str]:
+    ran = {name for run in runs for name in run.summary.controllers}
     robots = ", ".join(sorted({str(run.summary.robot) for run in runs}))
     seeds = ", ".join(sorted({str(run.summary.seed) for run in runs}))
-    if any(_beside_a_person(run) for run in runs):
+    beside = [run for run in runs if _beside_a_person(run)]
+    if beside:
+        recorded = ", ".join(dict.fromkeys(filter(None, (r.summary.recording for r in beside))))
+        who = f"The person recorded in {recorded} moves" if recorded else "A virtual subject works"
         yield (
-            "<p>A virtual subject walks in, fetches tools and assembles at a car door while the "
-            "arm goes back and forth before it. True distances run from the person to the links "
-            "that move.</p>"
+            f"<p>{escape(who)} beside the arm, which goes from way point to way point. True "
+            "distances run from the person to the links that move.</p>"
         )
     yield (
         f"<p>A simulated arm ({escape(robots)}, seed {escape(seeds)}) with rings of 8 x 8 zone "
         f"time-of-flight sensors {_sent(runs)}. Each scene is run "
-        "by several controllers that differ in one thing: what the avoidance may move. "
-        "<code>wb</code> moves the surface point nearest to the obstacle, on any link, covered "
-        "with sensors or not; <code>sm</code>, the baseline, only the sensors' own mounting "
-        "points; <code>wb_known</code> is <code>wb</code> with points of the scene itself in place "
-        "of the sensors: the ceiling, not a result of ours; <code>wb_memory</code> is "
-        "<code>wb</code> that remembers what left the sensors' view.</p>"
+        "by the controllers below. "
+        + " ".join(f"{text}." for name, text in _MOVES.items() if name in ran)
+        + "</p>"
     )
+
+
+#: What each controller moves and is given.
+_MOVES = {
+    "wb": "<code>wb</code> moves the surface point nearest to the obstacle, on any link, covered "
+    "with sensors or not",
+    "sm": "<code>sm</code>, the baseline, moves only the sensors' own mounting points",
+    "wb_known": "<code>wb_known</code> is <code>wb</code> with points of the scene itself in place "
+    "of the sensors: the ceiling, not a result of ours",
+    "wb_memory": "<code>wb_memory</code> is <code>wb</code> that remembers what left the sensors' "
+    "view",
+}
 
 
 def _beside_a_person(run: Run) -> bool:

@@ -103,7 +103,9 @@ def _summary(scenario: Scenario, logs: Sequence[TrialLog]) -> Summary:
 
     summary = static_summary(logs)
     if isinstance(scenario, HriScenario):
-        summary["subject"] = scenario.operator.subject
+        recorded = scenario.operator.recording is not None
+        summary["subject"] = None if recorded else scenario.operator.subject
+        summary["recording"] = scenario.operator.who if recorded else None
         summary["gain_mm"] = None  # of the run's end, when the person has left
         for log in logs:
             summary["controllers"][log.controller]["mean_m"] = {

@@ -83,7 +83,7 @@ def run_command(options: RunOptions, command: str) -> int:
     from proxcgal.apps.results import Plan, check, perform
     from proxcgal.apps.run_joint import run_joint
     from proxcgal.errors import ConfigError
-    from proxcgal.sim.scenario import load_scenario
+    from proxcgal.sim.scenario import HriScenario, load_scenario
     from proxcgal.sim.scenario_joint import JointScenario
 
     if options.controller == ():
@@ -95,11 +95,16 @@ def run_command(options: RunOptions, command: str) -> int:
         if number is not None and not least <= number < 2**63:
             raise ConfigError(f"{name} {number}: must be {least} to {2**63 - 1}")
     if options.subject is not None:
-        kind = load_scenario(options.scenario, flat(options.set)).kind
-        if kind != "hri":
+        base = load_scenario(options.scenario, flat(options.set))
+        if not isinstance(base, HriScenario):
             raise ConfigError(
-                f'--subject {options.subject}: {options.scenario} has kind = "{kind}" and no '
+                f'--subject {options.subject}: {options.scenario} has kind = "{base.kind}" and no '
                 'operator; scenarios of kind = "hri" have one'
+            )
+        if base.operator.recording is not None:
+            raise ConfigError(
+                f"--subject {options.subject}: operator.recording = {base.operator.recording}: its "
+                "person is always the same; leave one of the two out"
             )
     scenario = load_scenario(options.scenario, overrides(options))
     if scenario.kind == "walkthrough":

@@ -34,6 +34,7 @@ class StoredSummary(_Stored):
     scenario: str
     robot: str
     seed: int
+    recording: str | None = None  # who was beside the arm, where nobody was drawn
     controllers: dict[str, Numbers]
     closest_points: dict[str, dict[str, float | None]] = {}  # shares of `sim.coverage`
     gain_mm: float | None = None

@@ -134,7 +134,9 @@ class HriScenario(Scenario):
         return self.operator.floor
 
     def signals(self) -> list[tuple[float, str]]:
-        """Time [s] and note of every signal of the timeline."""
+        """Time [s] and note of every signal of the timeline; none that a recording heeds."""
+        if self.operator.recording is not None:
+            return []
         return [(step.at, step.note) for step in self.operator.timeline]
 
     @property

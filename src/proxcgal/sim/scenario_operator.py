@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Self
 
 from pydantic import Field, model_validator
@@ -41,6 +42,11 @@ class Operator(Section):
     marks: dict[str, Mark] = Field(description="[m] x and y on the floor, by name")
     places: dict[str, Vector] = Field(description="[m] that hands go to, by name")
     timeline: tuple[Step, ...] = Field(min_length=1, description="one for each signal")
+
+    @property
+    def who(self) -> str:
+        """For titles: the subject's number, or the recording's file."""
+        return f"subject {self.subject}" if self.recording is None else Path(self.recording).name
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

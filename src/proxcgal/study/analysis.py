@@ -102,16 +102,26 @@ def combined(summaries: Sequence[Summary]) -> Summary:
 
 
 def table(summaries: Sequence[Summary]) -> str:
-    """The summaries as a table for a terminal: a line a trial, distances in metres."""
-    head = ("scenario", "controller", "true min", "true final", "seen min", "goal error", "gain")
-    units = ("", "", "[m]", "[m]", "[m]", "[m]", "[mm]")
+    """The summaries as a table for a terminal: a line a trial, distances in metres.
+
+    Ticks under 0.05 m have a column where there are any.
+    """
+    head = ["scenario", "controller", "true min", "true final", "seen min", "goal error", "gain"]
+    units = ["", "", "[m]", "[m]", "[m]", "[m]", "[mm]"]
+    numbers_of = [n for summary in summaries for n in summary["controllers"].values()]
+    violated = any(numbers["violations"] for numbers in numbers_of)
+    if violated:
+        head.insert(6, "violations")
+        units.insert(6, "[ticks]")
     rows = [head, units]
     for summary in summaries:
         for name, numbers in summary["controllers"].items():
             gain = summary["gain_mm"] if name == "wb" else None
             cells = [shown(numbers[key]) for key in CONTROLLER_KEYS[:4]]
+            if violated:
+                cells.append("-" if numbers["violations"] is None else str(numbers["violations"]))
             last = "" if gain is None else f"{gain:+.0f}"
-            rows.append((summary["scenario"], name, *cells, last))
+            rows.append([summary["scenario"], name, *cells, last])
     return aligned(rows, left=2, heads=2)
 
 
@@ -142,6 +152,11 @@ def aligned(rows: Sequence[Sequence[str]], *, left: int, heads: int) -> str:
         lines.append("  ".join(cells).rstrip())
     lines.insert(heads, "-" * max(map(len, lines)))
     return "\n".join(lines)
+
+
+def counted(number: int, noun: str) -> str:
+    """A count for a reader: "1 subject", "2 subjects"."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def shown(value: float | None) -> str:

@@ -41,6 +41,8 @@ class Cluster:
         #: What a job ends as that workers died with, whether they ran it or had it in their queue.
         self.killed: type[Exception] = distributed.KilledWorker
         try:
+            # First: a client of an address that is none fails half made, and again when collected.
+            import_module("distributed.comm").resolve_address(address)
             self._client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
         except (OSError, ValueError) as error:
             raise ConfigError(

@@ -8,13 +8,14 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from proxcgal.study.analysis import Summary
 from proxcgal.study.fault_rows import DEGRADED, HOLD, MODES, ROWS, RUN, STOP
 from proxcgal.study.figures import DPI, GREY, LEGEND
 
 COLOURS = {DEGRADED: "#E69F00", HOLD: "#0072B2", STOP: "#333333"}
 
 
-def figures(table: pl.DataFrame) -> dict[str, Figure]:
+def figures(table: pl.DataFrame, _: Summary | None = None) -> dict[str, Figure]:
     """Latency of every run, row by row, beside its bound; none where every trial failed."""
     done = table.filter(pl.col("error").is_null())
     robots = done["robot"].unique(maintain_order=True).to_list()
@@ -31,10 +32,16 @@ def figures(table: pl.DataFrame) -> dict[str, Figure]:
             latency = own["latency_ms"].drop_nulls().to_numpy()
             spread = np.linspace(-0.25, 0.25, len(latency))
             ax.plot(
-                latency, height + spread, ".", color=COLOURS[row.least], markersize=4, alpha=0.6
+                latency,
+                height + spread,
+                ".",
+                color=COLOURS[row.least],
+                markersize=4,
+                alpha=0.6,
+                zorder=3,
             )
             ax.plot(
-                [1000 * row.within] * 2, [height - 0.4, height + 0.4], color=GREY, lw=2, zorder=1
+                [1000 * row.within] * 2, [height - 0.4, height + 0.4], color=GREY, lw=1.2, zorder=1
             )
         ax.set_title(robot)
         ax.set_xlabel("time to the required mode [ms]")

@@ -55,6 +55,12 @@ def plan(wishes: Wishes) -> Campaign:
     scenes: dict[str, str] = {}
     robots: set[str] = set()
     for source in wishes.scenarios or SCENES:
+        kind = load_scenario(source).kind
+        if kind != "static":
+            raise ConfigError(
+                f'--scenario {source}: kind = "{kind}": campaign faults takes scenarios of '
+                'kind = "static"'
+            )
         base = load_scenario(source, (*SET, *wishes.overrides))
         _refuse_short(base)
         robot = robot_of(base)
@@ -237,4 +243,5 @@ KIND = Kind(
     "certificate.",
     plan=plan, analyse=analyse, listings=listings, verdicts=verdicts, figures=figures,
     captions=captions, worst=worst, pages=pages,
+    worst_of="all runs: the wrong ones, then the slowest",
 )  # fmt: skip

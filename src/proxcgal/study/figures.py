@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
@@ -30,6 +32,8 @@ NAMES = {
 }
 BANDS = ("#56B4E9", "#F0E442", "#CC79A7", "#E69F00", "#9BD8C2", "#B9B9E8", "#D9C6A5", "#C7C7C7")
 GREY = "#5A5A5A"
+#: The monitor's modes but RUN, in colours that no controller has.
+MODES = {1: ("DEGRADED", "#F0E442"), 2: ("HOLD", "#CC79A7"), 3: ("STOP", "#333333")}
 DASHED: Any = (0, (4, 1.6))
 LEGEND: dict[str, Any] = {"frameon": False, "fontsize": 9, "handlelength": 2.4}
 
@@ -38,7 +42,14 @@ Signals = Sequence[tuple[float, str]]  # time [s], note
 
 
 def time_figure(
-    logs: Sequence[TrialLog], *, title: str, d_min: float, buffer: float, signals: Signals = ()
+    logs: Sequence[TrialLog],
+    *,
+    title: str,
+    d_min: float,
+    buffer: float,
+    signals: Signals = (),
+    links: Sequence[str] = (),
+    faults: Sequence[tuple[float, float]] = (),
 ) -> Figure:
     """Distance, activation and link of the control point over time, all controllers in one.
 
@@ -50,17 +61,33 @@ def time_figure(
         d_min: distance that the avoidance keeps [m].
         buffer: Delta, over which its activation rises [m].
         signals: vertical lines through all of it.
+        links: the robot's, whose order fixes their colours; left out: as they come.
+        faults: start and end of each [s], shaded through all of it.
     """
     figure = Figure(figsize=(7.2, 6.0), dpi=DPI, layout=ConstrainedLayoutEngine(h_pad=0.1))
     FigureCanvasAgg(figure)
     figure.suptitle(title, fontsize=12, fontweight="bold")
-    axes = figure.subplots(3, 1, sharex=True, height_ratios=(3.4, 1.5, 0.32 * len(logs) + 0.1))
+    held = any((log.mode > 0).any() for log in logs)
+    band = 0.32 * len(logs) + 0.1
+    heights = (3.4, 1.5, band, band) if held else (3.4, 1.5, band)
+    axes = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
     _distances(axes[0], logs, d_min, buffer)
     _activations(axes[1], logs)
-    _links(axes[2], logs)
+    _links(axes[2], logs, links)
+    shaded = _modes(axes[3], logs) if held else []
+    for start, end in faults:
+        for ax in axes:
+            ax.axvspan(start, end, color=GREY, alpha=0.15, linewidth=0.0, zorder=0)
+    if faults:
+        shaded.append(Patch(color=GREY, alpha=0.15, label="fault"))
+    if shaded:
+        names = [str(patch.get_label()) for patch in shaded]
+        place: dict[str, Any] = {"loc": "upper right", "handlelength": 1.4, "fontsize": 8}
+        # Beside the axes' own legend, which keeps its room above them.
+        axes[0].add_artist(Legend(axes[0], shaded, names, frameon=False, **place))
     mark_signals(axes, signals)
-    axes[2].set_xlabel("time [s]", fontsize=10)
-    axes[2].set_xlim(0.0, max(_end(log) for log in logs))
+    axes[-1].set_xlabel("time [s]", fontsize=10)
+    axes[-1].set_xlim(0.0, max(_end(log) for log in logs))
     for ax in axes:
         ax.tick_params(labelsize=9)
         ax.spines[["top", "right"]].set_visible(False)
@@ -85,8 +112,11 @@ def _distances(ax: Axes, logs: Sequence[TrialLog], d_min: float, buffer: float) 
         colour, width = COLOURS.get(log.controller, "black"), _width(log.controller)
         true, seen = _gaps(log.true_m), _gaps(log.seen_m)
         if log.controller != "wb_known":  # there the two hardly differ: one line says it
-            ax.plot(log.time, seen, color=colour, linewidth=width, zorder=3)
-        ax.plot(log.time, true, color=colour, linewidth=width, linestyle=DASHED)
+            ax.plot(log.time, seen, color=colour, linewidth=width, zorder=_order(log.controller))
+        ax.plot(
+            log.time, true, color=colour, linewidth=width, linestyle=DASHED,
+            zorder=_order(log.controller),
+        )  # fmt: skip
         highest = max([highest, *true[np.isfinite(true)], *seen[np.isfinite(seen)]])
     ax.set_ylim(0.0, 1.06 * highest)
     ax.set_ylabel("minimum distance [m]", fontsize=10)
@@ -116,12 +146,17 @@ def mark_signals(axes: Iterable[Axes], signals: Signals) -> None:
                 ax.annotate(
                     note, (at, 1.0), xycoords=("data", "axes fraction"), xytext=(2, -3),
                     textcoords="offset points", fontsize=7, color=GREY, rotation=90, ha="left",
-                    va="top", bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5},
+                    va="top", zorder=1,
                 )  # fmt: skip
 
 
 def _width(controller: str) -> float:
-    return 1.0 if controller == "wb_known" else 1.6
+    """The whole body's lies under the others', wide enough to be seen on both sides."""
+    return {"wb": 2.4, "wb_known": 1.0}.get(controller, 1.2)
+
+
+def _order(controller: str) -> float:
+    return 2.0 if controller == "wb" else 3.0
 
 
 def _gaps(distance: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -132,28 +167,50 @@ def _gaps(distance: NDArray[np.float64]) -> NDArray[np.float64]:
 def _activations(ax: Axes, logs: Sequence[TrialLog]) -> None:
     for log in logs:
         colour = COLOURS.get(log.controller, "black")
-        ax.plot(log.time, log.activation, color=colour, linewidth=_width(log.controller))
+        ax.plot(
+            log.time, log.activation, color=colour, linewidth=_width(log.controller),
+            zorder=_order(log.controller),
+        )  # fmt: skip
     ax.set_ylim(-0.05, 1.08)
     ax.set_yticks((0.0, 0.5, 1.0))
     ax.set_ylabel("activation [-]", fontsize=10)
 
 
-def _links(ax: Axes, logs: Sequence[TrialLog]) -> None:
+def _modes(ax: Axes, logs: Sequence[TrialLog]) -> list[Patch]:
+    """One band a controller, coloured where it is not in RUN; the colours that are there."""
+    met: set[int] = set()
+    for row, log in enumerate(reversed(logs)):
+        for mode, start, end in _stretches(log, log.mode):
+            if mode > 0:
+                met.add(int(mode))
+                ax.broken_barh(
+                    [(start, end - start)], (row - 0.38, 0.76), facecolors=MODES[int(mode)][1]
+                )
+    ax.set_yticks(range(len(logs)), [log.controller for log in reversed(logs)])
+    ax.set_ylim(-0.6, len(logs) - 0.4)
+    ax.set_ylabel("mode", fontsize=10)
+    return [Patch(color=MODES[mode][1], label=MODES[mode][0]) for mode in sorted(met)]
+
+
+def _links(ax: Axes, logs: Sequence[TrialLog], links: Sequence[str]) -> None:
     """One band a controller, coloured and labelled by the link that the avoidance moves."""
     order: list[str] = []
     for log in logs:
         order += [link for link in dict.fromkeys(log.control_link) if link and link not in order]
+    known = [*links, *(link for link in order if link not in links)]
+    order.sort(key=known.index)
+    colours = {link: BANDS[known.index(link) % len(BANDS)] for link in order}
     duration = max(_end(log) for log in logs)
     told: set[str] = set()
     for row, log in enumerate(reversed(logs)):
         for link, start, end in _spans(log):
-            colour = BANDS[order.index(link) % len(BANDS)]
+            colour = colours[link]
             ax.broken_barh([(start, end - start)], (row - 0.38, 0.76), facecolors=colour)
             if end - start > 0.0115 * duration * len(link):  # else the text would not fit
                 ax.text((start + end) / 2, row, link, ha="center", va="center", fontsize=7.5)
                 told.add(link)
     if any(link not in told for link in order) and isinstance(ax.figure, Figure):
-        patches = [Patch(color=BANDS[row % len(BANDS)]) for row in range(len(order))]
+        patches = [Patch(color=colours[link]) for link in order]
         ax.figure.legend(patches, order, loc="outside lower center", ncols=4, **LEGEND)
     ax.set_yticks(range(len(logs)), [log.controller for log in reversed(logs)])
     ax.set_ylim(-0.6, len(logs) - 0.4)
@@ -167,16 +224,24 @@ def _end(log: TrialLog) -> float:
 
 def _spans(log: TrialLog) -> Iterator[tuple[str, float, float]]:
     """(link, start, end) of every stretch of time with the same link, those with none left out."""
-    links = np.asarray(log.control_link)
-    starts = np.flatnonzero(np.r_[True, links[1:] != links[:-1]])
+    for link, start, end in _stretches(log, np.asarray(log.control_link)):
+        if link:
+            yield str(link), start, end
+
+
+def _stretches(log: TrialLog, values: NDArray[Any]) -> Iterator[tuple[Any, float, float]]:
+    """(value, start, end) of every stretch of time with the same value."""
+    starts = np.flatnonzero(np.r_[True, values[1:] != values[:-1]])
     ends = np.r_[log.time[starts[1:]], _end(log)]
     for start, end in zip(starts, ends, strict=True):
-        if links[start]:
-            yield str(links[start]), float(log.time[start]), float(end)
+        yield values[start], float(log.time[start]), float(end)
 
 
 def png(figure: Figure) -> bytes:
     """The figure as a PNG file's bytes, the same for the same figure."""
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
+    with warnings.catch_warnings():
+        # A short run's notes are wider than its axes: they overlap, and the figure is as it was.
+        warnings.filterwarnings("ignore", "constrained_layout not applied", UserWarning)
+        figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
     return buffer.getvalue()

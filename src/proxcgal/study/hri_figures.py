@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,8 +15,8 @@ from matplotlib.lines import Line2D
 from proxcgal.study.bootstrap import mean_interval
 from proxcgal.study.figures import COLOURS, DASHED, DPI, GREY, LEGEND, NAMES, mark_signals
 from proxcgal.study.hri_numbers import (
-    PAPER,
     SAMPLE_S,
+    compared,
     paired_differences,
     phase_rows,
     series,
@@ -26,6 +26,9 @@ from proxcgal.study.hri_numbers import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from proxcgal.study.analysis import Summary
+
+Paper = Mapping[str, Mapping[str, tuple[float, float]]]  # mean and sigma_max [m]
 _DOTTED: Any = (0, (1, 1.5))
 _HIGHEST = 1.35  # [m] of a distance axis: beyond the sensors' workspace
 _LABELS = {
@@ -36,17 +39,18 @@ _LABELS = {
 _OVER = {"sm": 3, "wb": 4}
 
 
-def figures(table: pl.DataFrame) -> dict[str, Figure]:
-    """By file; none where every trial failed."""
+def figures(table: pl.DataFrame, summary: Summary | None = None) -> dict[str, Figure]:
+    """By file; none where every trial failed. The summary says which rows the paper has."""
     done = table.filter(pl.col("error").is_null())
     main = done.filter(pl.col("layout") == "main")
     if main.is_empty():
         return {}
+    paper = compared(summary or {})
     return {
         "trials.png": _trials(main),
         "cycles.png": _cycles(main),
-        "subjects.png": _subjects(main),
-        "differences.png": _differences(done),
+        "subjects.png": _subjects(main, paper),
+        "differences.png": _differences(done, paper),
     }
 
 
@@ -151,7 +155,7 @@ def _cycles(main: pl.DataFrame) -> Figure:
     return figure
 
 
-def _subjects(main: pl.DataFrame) -> Figure:
+def _subjects(main: pl.DataFrame, paper: Paper) -> Figure:
     rows = phase_rows(main)
     names = main["controller"].unique(maintain_order=True).to_list()
     figure = _figure(max(1.45 * len(rows) + 2.0, 8.6), 3.9)
@@ -169,7 +173,7 @@ def _subjects(main: pl.DataFrame) -> Figure:
             seen = list(subject_means(main, row, seen=True).get(name, {}).values())
             if seen:
                 ax.plot([x], [np.mean(seen)], "D", color=colour, markersize=5, fillstyle="none")
-            printed = PAPER.get(row, {}).get(name)
+            printed = paper.get(row, {}).get(name)
             if printed is not None:
                 ax.plot([x], [printed[0]], "x", color="black", markersize=6)
     ax.set_xticks(range(len(rows)), [_LABELS.get(row, row) for row in rows])
@@ -180,13 +184,15 @@ def _subjects(main: pl.DataFrame) -> Figure:
         for name in names
     ]
     handles.append(Line2D([], [], color=GREY, marker="D", linestyle="", fillstyle="none"))
-    handles.append(Line2D([], [], color="black", marker="x", linestyle=""))
-    labels = [*(NAMES.get(name, name) for name in names), "ours, seen", "the paper's (seen)"]
+    labels = [*(NAMES.get(name, name) for name in names), "ours, seen"]
+    if any(name in paper.get(row, {}) for row in rows for name in names):
+        handles.append(Line2D([], [], color="black", marker="x", linestyle=""))
+        labels.append("the paper's (seen)")
     figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), **LEGEND)
     return figure
 
 
-def _differences(done: pl.DataFrame) -> Figure:
+def _differences(done: pl.DataFrame, paper: Paper) -> Figure:
     rows = phase_rows(done)
     layouts = done["layout"].unique(maintain_order=True).to_list()
     figure = _figure(1.35 * len(rows) + 1.6, 3.7)
@@ -210,7 +216,7 @@ def _differences(done: pl.DataFrame) -> Figure:
                 yerr=[[interval.middle - interval.low], [interval.high - interval.middle]],
                 fmt="o", color=colours[layout], capsize=4, markersize=5, linewidth=1.6,
             )  # fmt: skip
-        printed = PAPER.get(row)
+        printed = paper.get(row)
         if printed is not None:
             ax.plot(
                 [place], [1000.0 * (printed["wb"][0] - printed["sm"][0])], "x", color="#0072B2",
@@ -222,8 +228,10 @@ def _differences(done: pl.DataFrame) -> Figure:
     handles = [
         Line2D([], [], color=colours[layout], marker="o", linestyle="") for layout in layouts
     ]
-    handles.append(Line2D([], [], color="#0072B2", marker="x", linestyle=""))
     names = {"main": "the cell as it is", "jittered": "positions moved"}
-    labels = [*(names[layout] for layout in layouts), "the paper's (seen)"]
+    labels = [names[layout] for layout in layouts]
+    if any(row in paper for row in rows):
+        handles.append(Line2D([], [], color="#0072B2", marker="x", linestyle=""))
+        labels.append("the paper's (seen)")
     figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), **LEGEND)
     return figure

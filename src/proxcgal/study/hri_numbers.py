@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Collection
 
 import numpy as np
 import polars as pl
@@ -50,6 +51,8 @@ def analyse(table: pl.DataFrame, campaign: Campaign) -> Summary:
         "jittered": None if jittered.is_empty() else _layout(jittered),
         "redrawn": campaign.notes["redrawn"],
         "settings": campaign.notes["settings"],
+        "recordings": campaign.notes["recordings"],
+        "compared": campaign.notes["compared"],
         "self_min_m": done["self_min_m"].min(),
         "self_under_limit": int((done["self_min_m"] < SELF_LIMIT_M).sum()),
         "not_finite": len(done) - int(done["finite"].sum()),
@@ -194,10 +197,21 @@ def _paired(values: Subjects) -> Summary:
     return found
 
 
-def held(layout: Summary) -> list[tuple[str, bool, str]]:
-    """Every bound of the experiment on one layout: what, whether it holds, the figures."""
+def compared(summary: Summary) -> dict[str, dict[str, tuple[float, float]]]:
+    """`PAPER`, of the rows that come from the paper's own cell."""
+    rows = summary.get("compared", PAPER)
+    return {row: cell for row, cell in PAPER.items() if row in rows}
+
+
+def held(layout: Summary, rows: Collection[str] = tuple(PAPER)) -> list[tuple[str, bool, str]]:
+    """Every bound of the experiment on one layout: what, whether it holds, the figures.
+
+    Args:
+        layout: as `analyse` has it.
+        rows: those from the paper's own cell; the others have no bound.
+    """
     found = []
-    for row in CLEAR:
+    for row in (row for row in CLEAR if row in rows):
         pair = layout["paired_mm"].get(row, {}).get("wb-sm")
         if pair is not None:
             text = (

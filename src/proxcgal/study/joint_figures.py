@@ -33,7 +33,7 @@ _TASKS = {
 }
 #: Curves of distance: what the arm was given, its colour, its name.
 _SEEN = {
-    "known": ("#009E73", "known"),
+    "known": ("#6A3D9A", "known"),
     "sensed": ("#0072B2", "sensed"),
     "memory": ("#CC79A7", "sensed with memory"),
 }
@@ -41,7 +41,7 @@ NEAR_M = 0.6  # [m] distances beyond it are not shown
 _DOTTED: Any = (0, (1, 1.5))
 
 
-def figures(table: pl.DataFrame) -> dict[str, Figure]:
+def figures(table: pl.DataFrame, _: Summary | None = None) -> dict[str, Figure]:
     """One a scene: a column for each start, of the first run of each kind."""
     found = {}
     for (scene,), own in table.group_by(["scene"], maintain_order=True):

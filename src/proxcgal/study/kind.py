@@ -49,14 +49,15 @@ class Kind:
     """One kind of campaign; a further one needs no more than this."""
 
     title: str  # of its page
-    introduction: str  # below the title
+    introduction: str | Callable[[Summary], str]  # below the title
     plan: Callable[[Wishes], Campaign]
     analyse: Callable[[pl.DataFrame, Campaign], Summary]
     listings: Callable[[Summary], list[Listing]]
     verdicts: Callable[[Summary], list[str]]  # a sentence each, from the numbers
-    figures: Callable[[pl.DataFrame], dict[str, Figure]]  # by file
+    figures: Callable[[pl.DataFrame, Summary], dict[str, Figure]]  # by file
     captions: Callable[[Summary], dict[str, str]]  # of the same files
     worst: Callable[[pl.DataFrame], list[str]]  # keys of trials, the worst first
+    worst_of: str = "all trials"  # among which these are looked for, and by what
     pages: Callable[[Summary], dict[str, str]] | None = None  # further text, by file
     runs: int = 100  # where nothing else is wished for
     # Trials of one scene to show side by side, in a moving picture; none where it is left out.

@@ -1,7 +1,8 @@
-"""The arm backing away, as a moving picture: recorded runs side by side, under one caption each."""
+"""A moving picture of recorded runs: side by side, under one caption each."""
 
 from __future__ import annotations
 
+import bisect
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from proxcgal.sim.scenario import HriScenario
 from proxcgal.sim.setup import Setup
 from proxcgal.sim.solids import Box
 from proxcgal.sim.world import Camera, World
-from proxcgal.study.figures import COLOURS, NAMES
+from proxcgal.study.figures import COLOURS, GREY, NAMES
 
 FPS = 8.0
 FRAMES = 50  # of the run; the last one is then held
@@ -36,15 +37,19 @@ def motion_picture(
     Args:
         recordings: of one scenario; their ticks are repeated, which gives the clouds.
         path: where to.
-        still: where its last frame goes, as a PNG; beside a person, that of the least distance.
+        still: where its last frame goes, as a PNG; beside a person, the moment of the least true
+            distance of all runs.
         on_progress: told the share done, 0 to 1.
 
     Raises:
         SimulationError: there is no way to draw off screen.
     """
     setup = Setup.of(recordings[0].settings.scenario)
-    times = np.linspace(0.0, max(r.ticks[-1].given.time for r in recordings), FRAMES)
-    seen = [snapshots(recording, times.tolist()) for recording in recordings]
+    times = np.linspace(0.0, max(r.ticks[-1].given.time for r in recordings), FRAMES).tolist()
+    telling, nearest = _telling(setup, recordings)
+    stills = bisect.bisect_left(times, telling)  # where the still's moment stands among them
+    times.insert(stills, telling)
+    seen = [snapshots(recording, times) for recording in recordings]
     camera = camera_for(setup)
     world = World(setup.robot, setup.scenario.drawn(), setup.scenario.floor, setup.scene.names)
     frames = []
@@ -52,23 +57,34 @@ def motion_picture(
         for row, moment in enumerate(zip(*seen, strict=True)):
             frame = Image.new("RGB", (PANE[0] * len(recordings), PANE[1] + STRIP), "white")
             for column, (snapshot, recording) in enumerate(zip(moment, recordings, strict=True)):
-                pane = _pane(world, camera, snapshot, recording.settings.controller)
+                note = "  (the least)" if row == stills and column == nearest else ""
+                pane = _pane(world, camera, snapshot, recording, note)
                 frame.paste(pane, (column * PANE[0], 0))
             frames.append(frame)
             if on_progress is not None:
-                on_progress((row + 1) / FRAMES)
+                on_progress((row + 1) / len(times))
     finally:
         world.close()
-    frames[_telling(setup, seen)].save(still, optimize=True)
+    frames.pop(stills).save(still, optimize=True)
     write_gif(frames + frames[-1:] * HELD, path, FPS)
 
 
-def _telling(setup: Setup, seen: Sequence[Sequence[Snapshot]]) -> int:
-    """The frame that shows most: people come, and in the end are gone."""
-    if not isinstance(setup.scenario, HriScenario):
-        return -1
-    least = [[snapshot.tick.truth.distance for snapshot in run] for run in seen]
-    return int(np.min(least, axis=0).argmin())
+def _telling(setup: Setup, recordings: Sequence[Recording]) -> tuple[float, int]:
+    """The moment [s] that shows most, and which run came nearest then, -1 where none is named.
+
+    The end; beside a person, who comes and in the end is gone, the least distance of all runs.
+    """
+    if isinstance(setup.scenario, HriScenario):
+        least = [
+            (tick.truth.distance, run, tick.given.time)
+            for run, recording in enumerate(recordings)
+            for tick in recording.ticks
+            if np.isfinite(tick.truth.distance)
+        ]
+        if least:
+            _, run, time = min(least)
+            return time, run
+    return max(recording.ticks[-1].given.time for recording in recordings), -1
 
 
 def camera_for(setup: Setup) -> Camera:
@@ -106,7 +122,10 @@ def bearing_for(setup: Setup) -> float:
     return float(np.arctan2(away[1], away[0]) + np.deg2rad(78.0))
 
 
-def _pane(world: World, camera: Camera, snapshot: Snapshot, controller: str) -> Image.Image:
+def _pane(
+    world: World, camera: Camera, snapshot: Snapshot, recording: Recording, note: str
+) -> Image.Image:
+    controller, scenario = recording.settings.controller, recording.settings.scenario
     picture = Image.new("RGB", (PANE[0], PANE[1] + STRIP), "white")
     picture.paste(Image.fromarray(draw(world, snapshot, PANE, camera)), (0, 0))
     pen = ImageDraw.Draw(picture)
@@ -115,7 +134,10 @@ def _pane(world: World, camera: Camera, snapshot: Snapshot, controller: str) -> 
     top = PANE[1] + 8
     pen.text((10, top), NAMES.get(controller, controller), font=_font(bold=True), fill=colour)
     true = 1000.0 * snapshot.tick.truth.distance
-    text = f"t = {snapshot.tick.given.time:.1f} s    true distance {true:.0f} mm"
+    if isinstance(scenario, HriScenario):
+        whose = f"{scenario.name}, {scenario.operator.who}"
+        pen.text((PANE[0] - 10, top), whose, font=_font(), fill=GREY, anchor="ra")
+    text = f"t = {snapshot.tick.given.time:.1f} s    true distance {true:.0f} mm{note}"
     pen.text((10, top + 18), text, font=_font(), fill="black")
     return picture
 

@@ -226,4 +226,5 @@ KIND = Kind(
     "sensors' view.",
     plan=plan, analyse=analyse, listings=listings, verdicts=verdicts, figures=figures,
     captions=captions, worst=worst,
+    worst_of="wb's trials, by the least true distance",
 )  # fmt: skip

@@ -132,7 +132,7 @@ def _sureness(paired: Summary) -> str:
     )
 
 
-def figures(table: pl.DataFrame) -> dict[str, Figure]:
+def figures(table: pl.DataFrame, _: Summary | None = None) -> dict[str, Figure]:
     """Two a scene: distributions at the end, pairs, differences; what memory gives back."""
     drawn: dict[str, Figure] = {}
     for (scene,), own in table.group_by(["scene"], maintain_order=True):

@@ -208,7 +208,7 @@ def verdicts(summary: Summary) -> list[str]:
     return told
 
 
-def figures(table: pl.DataFrame) -> dict[str, Figure]:
+def figures(table: pl.DataFrame, _: Summary | None = None) -> dict[str, Figure]:
     """Distribution of stop times and distances; none where nothing stopped."""
     done = table.filter(pl.col("error").is_null(), _STOPPED)
     if done.is_empty():
