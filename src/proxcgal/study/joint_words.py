@@ -141,7 +141,8 @@ def _tasks(runs: Sequence[Run]) -> Iterator[str]:
             f"runs reach the goal (full: {_reached([b for _, b in pairs])})"
         )
         if both:
-            slower = median(a["time_s"] - b["time_s"] for a, b in both)
+            # + 0.0: nothing is told as "+0.0 s", never "-0.0 s"
+            slower = round(median(a["time_s"] - b["time_s"] for a, b in both), 1) + 0.0
             text += f", {slower:+.1f} s in the median of those where both do"
         changes = [
             ("least true distance", "true_min_m", "m", 3),
