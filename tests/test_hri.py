@@ -376,7 +376,7 @@ def test_a_run_beside_a_person_has_means_and_no_gain_at_its_end(
         (("campaign", "hri", "--scenario", "front_plane"), 'must be "hri"'),
         (("campaign", "hri", "--set", "operator.subject=3"), "every subject has its own"),
         (("run", "front_plane", "--subject", "3"), "no operator"),
-        (("run", "hri_task1", "--subject", "0"), "operator.subject = 0"),
+        (("run", "hri_task1", "--subject", "0"), "--subject 0: must be 1 to"),
     ],
 )
 def test_what_cannot_be_is_told(
