@@ -152,7 +152,7 @@ def mark_signals(axes: Iterable[Axes], signals: Signals) -> None:
 
 def _width(controller: str) -> float:
     """The whole body's lies under the others', wide enough to be seen on both sides."""
-    return {"wb": 2.4, "wb_known": 1.0}.get(controller, 1.2)
+    return {"wb": 1.9, "wb_known": 1.0}.get(controller, 1.0)
 
 
 def _order(controller: str) -> float:
