@@ -151,6 +151,20 @@ TEST(Controller, OnKnownPointsSilentSensorsSlowNothing) {
   }
 }
 
+Pose sensor_0(const Robot& robot, const Skin& skin, const Posture& posture) {
+  const Mount& mount = skin.mounts[0];
+  return posture.T_WL[static_cast<std::size_t>(robot.link_row(mount.link))] * mount.T_LS;
+}
+
+/// A goal half a metre that way from the tool.
+Pose where_sensor_0_looks(const Robot& robot, const Skin& skin, const JointVector& q,
+                          Posture& posture) {
+  robot.update(q, posture);
+  Pose goal = posture.T_WT;
+  goal.translation() += 0.5 * sensor_0(robot, skin, posture).linear().col(2);
+  return goal;
+}
+
 TEST(Controller, MotionIntoWhatASilentSensorSawIsHeld) {
   const auto robot = test::arm();
   Skin skin = test::ring(10);
@@ -158,13 +172,7 @@ TEST(Controller, MotionIntoWhatASilentSensorSawIsHeld) {
   Random random(25);
   JointVector q = bent();
   Posture posture = robot->make_posture();
-  robot->update(q, posture);
-  const int link = robot->link_row("link3");
-  // The goal lies where sensor 0 looks.
-  Pose goal = posture.T_WT;
-  const Vector3 view_W =
-      (posture.T_WL[static_cast<std::size_t>(link)] * skin.mounts[0].T_LS).linear().col(2);
-  goal.translation() += 0.5 * view_W;
+  const Pose goal = where_sensor_0_looks(*robot, skin, q, posture);
   bool held = false;
   for (int i = 0; i < 100; ++i) {
     auto batch = scans(random, 10, static_cast<std::uint32_t>(i), 0.01 * i, 1.0);
@@ -193,20 +201,16 @@ TEST(Controller, WhereNoAgeHoldsMotionIntoWhatASilentSensorSawIsSlowedStill) {
   Random random(25);
   JointVector q = bent();
   Posture posture = robot->make_posture();
-  robot->update(q, posture);
-  const int link = robot->link_row("link3");
-  Pose goal = posture.T_WT;
-  goal.translation() +=
-      0.5 * (posture.T_WL[static_cast<std::size_t>(link)] * skin.mounts[0].T_LS).linear().col(2);
+  const Pose goal = where_sensor_0_looks(*robot, skin, q, posture);
   double fastest_seen = 0.0, fastest_blind = 0.0;
   for (int i = 0; i < 100; ++i) {
     auto batch = scans(random, 10, static_cast<std::uint32_t>(i), 0.01 * i, 1.0);
     if (i >= 40) batch.erase(batch.begin());
     const TickOutput& out = controller.tick(0.01 * i, q, batch, goal);
     robot->update(q, posture);
-    const Pose T_WS = posture.T_WL[static_cast<std::size_t>(link)] * skin.mounts[0].T_LS;
+    const Pose T_WS = sensor_0(*robot, skin, posture);
     Jacobian6 J;
-    robot->jacobian(posture, link, T_WS.translation(), J);
+    robot->jacobian(posture, robot->link_row(skin.mounts[0].link), T_WS.translation(), J);
     const double into = T_WS.linear().col(2).dot(J.topRows<3>() * out.qd);
     if (i < 40) fastest_seen = std::max(fastest_seen, into);
     if (i >= 80) fastest_blind = std::max(fastest_blind, into);
