@@ -14,6 +14,7 @@ from typing import NoReturn
 from rclpy.utilities import remove_ros_args
 
 from proxcgal.errors import ConfigError, ProxError
+from proxcgal_ros.processes import PARAMETERS, spinning
 
 
 def main() -> int:
@@ -48,9 +49,6 @@ def _own(arguments: list[str]) -> list[str]:
         raise ConfigError(f"{' '.join(arguments[split:])}: not understood; {PARAMETERS}") from None
 
 
-PARAMETERS = "parameters are given as --ros-args -p NAME:=VALUE"
-
-
 class _Parser(argparse.ArgumentParser):
     """Tells what is wrong in one line."""
 
@@ -62,7 +60,6 @@ class _Parser(argparse.ArgumentParser):
 def _node(options: argparse.Namespace, arguments: list[str]) -> int:
     del options
     from proxcgal_ros.node import ControllerNode
-    from proxcgal_ros.processes import spinning
 
     with spinning(arguments) as (executor, running):
         node = ControllerNode(executor, running)
@@ -80,7 +77,6 @@ def _sim(options: argparse.Namespace, arguments: list[str]) -> int:
     from contextlib import nullcontext
 
     from proxcgal.sim.scenario import load_scenario
-    from proxcgal_ros.processes import spinning
     from proxcgal_ros.sim import SimulatedArm, SimulatedSensors, sensors_beside
 
     seed = [] if options.seed is None else [f"seed={options.seed}"]
@@ -116,7 +112,6 @@ def _writable(path: Path) -> bool:
 
 def _joint(options: argparse.Namespace, arguments: list[str]) -> int:
     from proxcgal_ros.joint import JointNode
-    from proxcgal_ros.processes import spinning
 
     with spinning(arguments) as (executor, running):
         node = JointNode(executor, running, options.scenario, options.set, options.second)

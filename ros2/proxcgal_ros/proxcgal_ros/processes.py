@@ -17,6 +17,8 @@ try:  # much less time a message, where this ROS 2 has it
 except ImportError:
     EventsExecutor = None
 
+PARAMETERS = "parameters are given as --ros-args -p NAME:=VALUE"
+
 
 @contextmanager
 def spinning(arguments: list[str]) -> Iterator[tuple[Executor, Callable[[], bool]]]:
@@ -35,10 +37,7 @@ def spinning(arguments: list[str]) -> Iterator[tuple[Executor, Callable[[], bool
         rclpy.init(args=arguments, signal_handler_options=rclpy.SignalHandlerOptions.NO)
     except RuntimeError:  # rclpy's own kinds of it have no public name
         words = arguments[arguments.index("--ros-args") + 1 :] if "--ros-args" in arguments else []
-        raise ConfigError(
-            f"--ros-args {' '.join(words)}: not understood; parameters are given as "
-            "--ros-args -p NAME:=VALUE"
-        ) from None
+        raise ConfigError(f"--ros-args {' '.join(words)}: not understood; {PARAMETERS}") from None
     for number in (signal.SIGINT, signal.SIGTERM):  # for good: the process ends after this
         signal.signal(number, end)
     executor: Executor = SingleThreadedExecutor() if EventsExecutor is None else EventsExecutor()

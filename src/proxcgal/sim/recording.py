@@ -56,8 +56,10 @@ class Recording:
         holds ticks with scans only, the run's own time.
         """
         times: Array = np.array([tick.given.time for tick in self.ticks])
-        if self.settings.ticks != "all" or len(times) < 2:
-            return times if self.settings.ticks != "all" else np.zeros(len(times))
+        if self.settings.ticks != "all":
+            return times
+        if len(times) < 2:
+            return np.zeros(len(times))
         period = 1.0 / self.settings.scenario.simulation.control_hz
         steps = np.diff(times)
         steps[(steps <= 0.0) | (steps > _LONGEST_STEP)] = period
