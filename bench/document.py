@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
 
-from proxcgal.apps.origin import commit, machine
+from proxcgal.core.provenance import commit, machine
 
 PATH = Path(__file__).parents[1] / "docs" / "benchmarks.md"
 _TITLE = """# Benchmarks

@@ -15,8 +15,8 @@ import numpy as np
 from document import markdown_table, write_section
 
 import proxcgal as px
-from proxcgal.sim.scenario import load_scenario
-from proxcgal.study.sweep_inputs import SCENARIOS, Inputs, grid_inputs
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.study.timing.inputs import SCENARIOS, Inputs, grid_inputs
 
 VERTICES, SCANS, TICKS, LOADS = 10000, 40, 3000, 5
 PERIOD, SWAY = 0.01, 0.05  # [s], [rad]: as bench_pipeline has them

@@ -44,9 +44,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from proxcgal.sim.scenario import load_scenario
-from proxcgal.study.sweep import call_of
-from proxcgal.study.sweep_inputs import REACH, SCENARIOS, Inputs, grid_inputs
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.study.timing.grid import call_of
+from proxcgal.study.timing.inputs import REACH, SCENARIOS, Inputs, grid_inputs
 
 MAGIC, END = b"PXBENCH1", b"PXBENCHE"
 MIN_HIT = 0.005  # [m] default of px.remove_body

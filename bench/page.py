@@ -19,12 +19,12 @@ import viser
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from browser import chromium, until
-from proxcgal.apps.origin import machine
-from proxcgal.apps.view.exchange import Told
-from proxcgal.apps.view.gate import close, serve
-from proxcgal.apps.view.live import LivePage
-from proxcgal.apps.view.simulation import FRAME_HZ, simulate
-from proxcgal.sim.scenario import Scenario, load_scenario
+from proxcgal.core.provenance import machine
+from proxcgal.scenario.loading import Scenario, load_scenario
+from proxcgal.viewer.access import close, serve
+from proxcgal.viewer.live_page import LivePage
+from proxcgal.viewer.messages import Told
+from proxcgal.viewer.simulation import FRAME_HZ, simulate
 
 CANVAS = (640, 400)  # [px]
 PANEL = 340  # [px] that the controls take beside it

@@ -15,7 +15,7 @@ import open3d as o3d
 from numpy.typing import NDArray
 
 from proxcgal.models import Robot
-from proxcgal.study.sweep_inputs import Inputs
+from proxcgal.study.timing.inputs import Inputs
 
 Array = NDArray[np.float64]
 

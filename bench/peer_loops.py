@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from peer_libraries import MIN_HIT
 
 from proxcgal.models import Robot
-from proxcgal.study.sweep_inputs import Inputs
+from proxcgal.study.timing.inputs import Inputs
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from document import markdown_table
 
-from proxcgal.study.sweep import ALGORITHMS
+from proxcgal.study.timing.grid import ALGORITHMS
 
 HEAD = """## Against other libraries
 

@@ -31,11 +31,11 @@ from peer_libraries import MIN_HIT, Coal, Fcpw, Libigl, Open3D
 from peer_loops import Spheres, closest, remove_body
 from peer_tables import FOOT, HEAD, tables
 
-from proxcgal.apps.progress import Progress
-from proxcgal.errors import ModelWarning
-from proxcgal.sim.scenario import load_scenario
-from proxcgal.study.sweep import ALGORITHMS, METHODS, Effort, call_of, measure
-from proxcgal.study.sweep_inputs import REACH, SCENARIOS, VERTICES, Inputs, grid_inputs
+from proxcgal.core.errors import ModelWarning
+from proxcgal.core.progress import Progress
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.study.timing.grid import ALGORITHMS, METHODS, Effort, call_of, measure
+from proxcgal.study.timing.inputs import REACH, SCENARIOS, VERTICES, Inputs, grid_inputs
 
 PEERS = (Open3D, Fcpw, Libigl, Coal)
 CULLED = " + culling"

@@ -9,7 +9,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from proxcgal.errors import ModelWarning, ProxError
+from proxcgal.core.errors import ModelWarning, ProxError
 
 # Of one call, imports apart: docs/reliability.md for a URDF, and enough for the others.
 SECONDS = 1.0

@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from proxcgal import _core
-from proxcgal.sim import packing
-from proxcgal.sim.recorder import Recorder, Settings
-from proxcgal.sim.scenario import load_scenario
-from proxcgal.sim.ticks import Found, TaskResult, Tick, TickInput, TickResult, TickTruth
+from proxcgal.recording import codec
+from proxcgal.recording.writer import Recorder, Settings
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.sim.tick import Found, TaskResult, Tick, TickInput, TickResult, TickTruth
 
 CORPUS = Path(__file__).parent / "corpus"
 
@@ -119,7 +119,7 @@ def _recordings() -> dict[str, bytes]:
                 recorder.write(_tick(row))
         files[f"{name}.mcap"] = path.read_bytes()
     files["cut.mcap"] = files["whole.mcap"][:-900]
-    data = packing.encode(_tick(1), 0)
+    data = codec.encode(_tick(1), 0)
     files["tick"] = data[data.index(b',"q":') : data.rindex(b',"crc":')]
     return files
 

@@ -11,7 +11,7 @@ from bounds import promises
 from places import folder
 
 from proxcgal import MeshTree
-from proxcgal.models.meshes import SUFFIXES, clean, load_mesh
+from proxcgal.models.mesh.files import SUFFIXES, clean, load_mesh
 
 
 def once(data: bytes) -> None:

@@ -13,10 +13,10 @@ from bounds import promises
 from mcap.writer import MCAP0_MAGIC
 from places import folder
 
-from proxcgal.sim import packing
-from proxcgal.sim.recorder import Recorder, Settings
-from proxcgal.sim.recording import read_recording
-from proxcgal.sim.scenario import load_scenario
+from proxcgal.recording import codec
+from proxcgal.recording.reader import read_recording
+from proxcgal.recording.writer import Recorder, Settings
+from proxcgal.scenario.loading import load_scenario
 
 
 @functools.cache
@@ -46,4 +46,4 @@ def once(data: bytes) -> None:
     path.write_bytes(data if data.startswith(MCAP0_MAGIC[:4]) else _with_tick(data))
     with promises():
         for tick in read_recording(path).ticks:
-            packing.encode(tick, 0)
+            codec.encode(tick, 0)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from bounds import ViolationError, promises
 from places import folder
 
-from proxcgal.sim.scenario import load_scenario, parse_scenario
+from proxcgal.scenario.loading import load_scenario, parse_scenario
 
 
 def once(data: bytes) -> None:

@@ -8,10 +8,10 @@ import pytest
 
 import proxcgal as px
 from browser import Tab, chromium
-from proxcgal.apps import cli
-from proxcgal.study import static
+from proxcgal.cli import main
 from proxcgal.study.campaign import Campaign
 from proxcgal.study.kind import Wishes
+from proxcgal.study.static import campaign as static_campaign
 
 SHARED_ROBOTS = Path(__file__).parents[2] / "shared" / "robots"
 
@@ -72,7 +72,7 @@ def call(
     monkeypatch.chdir(tmp_path)
 
     def run(*arguments: str | Path) -> Answer:
-        code = cli.main([str(argument) for argument in arguments])
+        code = main.main([str(argument) for argument in arguments])
         return Answer(code, *capsys.readouterr())
 
     return run
@@ -81,7 +81,7 @@ def call(
 @pytest.fixture(scope="session")
 def planned() -> Campaign:
     """A small campaign: two draws of 0.2 s round one scene, four controllers each."""
-    return static.plan(
+    return static_campaign.plan(
         Wishes(runs=2, seed=0, scenarios=("front_plane",), overrides=("duration=0.2",))
     )
 
@@ -94,7 +94,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "campaign", "static", "--scenario", "front_plane", "--runs", "2", "--set", "duration=0.2",
         "--workers", "1", "--keep", "worst:1", "--quiet", "--out", str(folder),
     ]  # fmt: skip
-    assert cli.main(arguments) == 0
+    assert main.main(arguments) == 0
     return folder
 
 

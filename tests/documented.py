@@ -2,8 +2,8 @@
 
 from pydantic import BaseModel
 
-from proxcgal.sim import toml
-from proxcgal.sim.scenario_problems import models_in
+from proxcgal.core import toml
+from proxcgal.scenario.problems import models_in
 
 
 def rows_of(model: type[BaseModel], path: str = "") -> list[str]:

@@ -10,10 +10,10 @@ import numpy as np
 import viser.transforms
 
 from browser import Tab, pixel, until
-from proxcgal.apps.view.gate import close, serve
-from proxcgal.apps.view.live import LivePage
-from proxcgal.apps.view.panel import HANDLE
-from proxcgal.sim.scenario import load_scenario
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.viewer.access import close, serve
+from proxcgal.viewer.live_page import LivePage
+from proxcgal.viewer.panel import HANDLE
 
 
 class Live:

@@ -4,7 +4,7 @@ from importlib import import_module
 
 import pytest
 
-from proxcgal.apps.campaign import KINDS
+from proxcgal.cli.campaign import KINDS
 from proxcgal.study.campaign import Ended
 from proxcgal.study.figures import png
 from proxcgal.study.kind import Kind, Wishes

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from PIL import Image
 
 import proxcgal as px
-from proxcgal.sim.coverage import Coverage
-from proxcgal.study import analysis, figures
+from proxcgal.evaluation import metrics
+from proxcgal.evaluation.coverage import Coverage
+from proxcgal.study import figures
 
 HZ = 100
 
@@ -66,13 +67,13 @@ def both() -> list[Any]:
 
 
 def test_summary_has_the_keys_that_the_experiments_ask_for(both: list[Any]) -> None:
-    summary = analysis.static_summary(both)
+    summary = metrics.static_summary(both)
     assert list(summary) == [
         "scenario", "robot", "seed", "controllers", "closest_points", "gain_mm", "self_min_m",
         "failed",
     ]  # fmt: skip
     assert list(summary["controllers"]) == list(summary["closest_points"]) == ["wb", "sm"]
-    assert tuple(summary["closest_points"]["wb"]) == analysis.COVERAGE_KEYS
+    assert tuple(summary["closest_points"]["wb"]) == metrics.COVERAGE_KEYS
     for numbers in summary["controllers"].values():
         assert list(numbers) == [
             "true_min_m", "true_final_m", "seen_min_m", "goal_error_m", "violations", "self_min_m",
@@ -80,15 +81,15 @@ def test_summary_has_the_keys_that_the_experiments_ask_for(both: list[Any]) -> N
 
 
 def test_gain_is_wb_over_sm_at_the_end_in_millimetres(both: list[Any]) -> None:
-    assert analysis.static_summary(both)["gain_mm"] == pytest.approx(220.0)
+    assert metrics.static_summary(both)["gain_mm"] == pytest.approx(220.0)
 
 
 def test_gain_is_null_where_one_of_the_two_did_not_run() -> None:
-    assert analysis.static_summary([make_log("wb")])["gain_mm"] is None
+    assert metrics.static_summary([make_log("wb")])["gain_mm"] is None
 
 
 def test_ticks_under_50_mm_are_violations(both: list[Any]) -> None:
-    controllers = analysis.static_summary(both)["controllers"]
+    controllers = metrics.static_summary(both)["controllers"]
     # 0.5 - 0.235 t < 0.05 from t = 1.915 s on
     assert controllers["sm"]["violations"] == 600 - 192
     assert controllers["wb"]["violations"] == 0
@@ -96,18 +97,18 @@ def test_ticks_under_50_mm_are_violations(both: list[Any]) -> None:
 
 def test_a_distance_to_nothing_is_written_as_9_99() -> None:
     nothing = np.full(600, np.inf)
-    numbers = analysis.static_summary([make_log(seen_m=nothing)])["controllers"]["wb"]
+    numbers = metrics.static_summary([make_log(seen_m=nothing)])["controllers"]["wb"]
     assert numbers["seen_min_m"] == 9.99
 
 
 def test_a_gain_over_nothing_is_no_gain(both: list[Any]) -> None:
     both[0].true_m = np.full(600, np.inf)
-    assert analysis.static_summary(both)["gain_mm"] is None
+    assert metrics.static_summary(both)["gain_mm"] is None
 
 
 def test_what_does_not_apply_is_null_and_the_json_is_strict(tmp_path: Path) -> None:
-    summary = analysis.static_summary([make_log(own_m=float("nan"))])
-    analysis.write_json(tmp_path / "summary.json", summary)
+    summary = metrics.static_summary([make_log(own_m=float("nan"))])
+    metrics.write_json(tmp_path / "summary.json", summary)
     text = (tmp_path / "summary.json").read_text()
     assert json.loads(text)["self_min_m"] is None
     assert "NaN" not in text
@@ -115,23 +116,23 @@ def test_what_does_not_apply_is_null_and_the_json_is_strict(tmp_path: Path) -> N
 
 
 def test_numbers_survive_the_file_exactly(tmp_path: Path, both: list[Any]) -> None:
-    summary = analysis.static_summary(both)
-    analysis.write_json(tmp_path / "summary.json", summary)
+    summary = metrics.static_summary(both)
+    metrics.write_json(tmp_path / "summary.json", summary)
     assert json.loads((tmp_path / "summary.json").read_text()) == summary
 
 
 def test_a_number_that_json_cannot_hold_leaves_the_old_file_whole(tmp_path: Path) -> None:
     path = tmp_path / "summary.json"
-    analysis.write_json(path, {"a": 1})
+    metrics.write_json(path, {"a": 1})
     with pytest.raises(ValueError, match="JSON"):
-        analysis.write_json(path, {"a": float("nan")})
+        metrics.write_json(path, {"a": float("nan")})
     assert json.loads(path.read_text()) == {"a": 1}
     assert [p.name for p in tmp_path.iterdir()] == ["summary.json"]
 
 
 @pytest.mark.parametrize(("own", "failed"), [(0.019, True), (0.02, False)])
 def test_a_run_nearer_than_20_mm_to_itself_has_failed(own: float, failed: bool) -> None:
-    summary = analysis.static_summary([make_log("wb"), make_log("sm", own_m=own)])
+    summary = metrics.static_summary([make_log("wb"), make_log("sm", own_m=own)])
     assert summary["self_min_m"] == own
     assert summary["failed"] is failed
 
@@ -139,36 +140,36 @@ def test_a_run_nearer_than_20_mm_to_itself_has_failed(own: float, failed: bool) 
 @pytest.mark.parametrize("field", ["scenario", "robot", "seed"])
 def test_trials_of_different_kinds_are_not_summed_up(field: str) -> None:
     with pytest.raises(px.ConfigError, match=field):
-        analysis.static_summary([make_log("wb"), make_log("sm", **{field: 99})])
+        metrics.static_summary([make_log("wb"), make_log("sm", **{field: 99})])
 
 
 def test_a_controller_twice_or_no_trial_at_all_is_refused() -> None:
     with pytest.raises(px.ConfigError, match="wb, wb"):
-        analysis.static_summary([make_log("wb"), make_log("wb")])
+        metrics.static_summary([make_log("wb"), make_log("wb")])
     with pytest.raises(px.ConfigError, match="at least one"):
-        analysis.static_summary([])
+        metrics.static_summary([])
 
 
 def test_combined_keeps_every_scenario_and_the_worst_of_all(both: list[Any]) -> None:
-    front = analysis.static_summary(both)
-    side = analysis.static_summary([make_log(scenario="side_plane", own_m=0.01)])
-    whole = analysis.combined([front, side])
+    front = metrics.static_summary(both)
+    side = metrics.static_summary([make_log(scenario="side_plane", own_m=0.01)])
+    whole = metrics.combined([front, side])
     assert whole["scenarios"] == {"front_plane": front, "side_plane": side}
     assert whole["self_min_m"] == 0.01
     assert whole["failed"] is True
 
 
 def test_the_table_has_a_line_a_trial_and_the_gain_beside_wb(both: list[Any]) -> None:
-    lines = analysis.table([analysis.static_summary(both)]).splitlines()
+    lines = metrics.table([metrics.static_summary(both)]).splitlines()
     assert len(lines) == 2 + 1 + 2
     wb = next(line for line in lines if " wb " in line)
     assert wb.split() == ["front_plane", "wb", "0.250", "0.250", "0.260", "0.400", "0", "+220"]
 
 
 def test_the_table_counts_violations_where_there_are_any(both: list[Any]) -> None:
-    assert "violations" not in analysis.table([analysis.static_summary(both[:1])])
-    summary = analysis.static_summary(both)
-    lines = analysis.table([summary]).splitlines()
+    assert "violations" not in metrics.table([metrics.static_summary(both[:1])])
+    summary = metrics.static_summary(both)
+    lines = metrics.table([summary]).splitlines()
     assert "violations" in lines[0]
     told = str(summary["controllers"]["sm"]["violations"])
     assert next(line for line in lines if " sm " in line).split()[-1] == told != "0"
@@ -249,6 +250,6 @@ def test_a_full_disk_is_told_with_the_file_that_had_no_room(
 
     monkeypatch.setattr("os.fsync", full)
     with pytest.raises(OSError, match="No space left") as caught:
-        analysis.write_json(tmp_path / "summary.json", {})
+        metrics.write_json(tmp_path / "summary.json", {})
     assert caught.value.filename == str(tmp_path / "summary.json")
     assert list(tmp_path.iterdir()) == []

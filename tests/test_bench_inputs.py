@@ -11,8 +11,8 @@ import pytest
 from numpy.typing import NDArray
 
 import proxcgal as px
-from proxcgal.sim.scenario import load_scenario
-from proxcgal.study.sweep_inputs import Inputs, grid_inputs
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.study.timing.inputs import Inputs, grid_inputs
 
 SCRIPT = Path(__file__).parents[1] / "bench" / "inputs.py"
 

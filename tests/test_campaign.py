@@ -18,22 +18,22 @@ from typing import Any
 import pytest
 
 import proxcgal as px
-from proxcgal.sim.scenario import load_scenario
-from proxcgal.study import static
+from proxcgal.scenario.loading import load_scenario
 from proxcgal.study.campaign import Campaign, Trial, run_campaign, unfinished
-from proxcgal.study.pool import Pool
+from proxcgal.study.static import campaign as static_campaign
 from proxcgal.study.store import Outcome, Store
 from proxcgal.study.trials import robot_of
+from proxcgal.study.workers import Pool
 
 SMALL = ("--scenario", "front_plane", "--runs", "2", "--set", "duration=0.2")
 ONE = (*SMALL[:3], "1", *SMALL[4:], "--workers", "1", "--quiet")
-PROGRAM = [sys.executable, "-c", "import sys; from proxcgal.apps.cli import main; sys.exit(main())"]
+PROGRAM = [sys.executable, "-c", "import sys; from proxcgal.cli.main import main; sys.exit(main())"]
 
 PERFORM = """
 import os, signal
 from pathlib import Path
 
-from proxcgal.study import static
+from proxcgal.study.static import campaign as static_campaign
 
 def ours(trial):
     return (trial.controller, trial.tags["draw"]) == ("sm", 0)
@@ -59,7 +59,7 @@ def dies_once_truly(trial, report):
     if ours(trial) and not Path("died").exists():
         Path("died").touch()
         os.kill(os.getpid(), signal.SIGKILL)
-    return static.perform(trial, report)
+    return static_campaign.perform(trial, report)
 
 def fails(trial, report):
     if ours(trial):
@@ -198,14 +198,14 @@ def test_a_trial_that_fails_stops_no_other(
 def test_a_failed_trial_is_told_with_what_repeats_it(
     call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    real = static.simulate
+    real = static_campaign.simulate
 
     def simulate(scenario: object, controller: str, *rest: object, **keys: object) -> object:
         if controller == "sm":
             raise px.SimulationError("MuJoCo warned")
         return real(scenario, controller, *rest, **keys)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(static, "simulate", simulate)
+    monkeypatch.setattr(static_campaign, "simulate", simulate)
     answer = call(*ONE, "--keep", "none", "--out", "here")
     assert answer.code == 1
     command = answer.err.splitlines()[-1].removeprefix("proxcgal:").strip()
@@ -224,7 +224,7 @@ def test_a_campaign_of_which_every_trial_fails_still_tells_so(
     def simulate(*_: object, **__: object) -> object:
         raise px.SimulationError("MuJoCo warned")
 
-    monkeypatch.setattr(static, "simulate", simulate)
+    monkeypatch.setattr(static_campaign, "simulate", simulate)
     answer = call(*ONE, "--out", "here")
     assert answer.code == 1
     assert answer.err.count(": failed: MuJoCo warned\n") == 4
@@ -268,7 +268,7 @@ def test_a_cluster_that_loses_a_worker_with_its_trial_gives_the_summary_of_one_p
     cluster: Callable[..., str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(static, "perform", performs.dies_once_truly)
+    monkeypatch.setattr(static_campaign, "perform", performs.dies_once_truly)
     address = cluster()
     answer = call(*SMALL, "--cluster", address, "--keep", "worst:1", "--quiet", "--out", "far")
     assert answer.code == 0
@@ -394,7 +394,7 @@ def test_another_campaigns_folder_is_refused(call: Call, whole: Path) -> None:
 def test_a_folder_of_another_build_is_refused(
     call: Call, whole: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("proxcgal.sim.versions.build", lambda: "another")
+    monkeypatch.setattr("proxcgal.core.versions.build", lambda: "another")
     answer = call(*SMALL, "--quiet", "--out", whole)
     assert answer.code == 2
     assert "holds another campaign: made_with is " in answer.err
@@ -422,7 +422,7 @@ def test_another_robot_under_the_same_name_is_refused(planned: Campaign) -> None
     assert robot_of(trial.scenario, trial.robot_digest).digest == trial.robot_digest
     assert robot_of(slower).digest != trial.robot_digest
     with pytest.raises(px.ConfigError, match="robot ur10e is another one here"):
-        static.perform(replace(trial, robot_digest="another"), lambda _: None)
+        static_campaign.perform(replace(trial, robot_digest="another"), lambda _: None)
 
 
 def test_two_processes_do_not_work_in_one_folder(call: Call, whole: Path) -> None:

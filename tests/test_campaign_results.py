@@ -12,13 +12,13 @@ import polars as pl
 import pytest
 
 import proxcgal as px
-from proxcgal.apps import cli
-from proxcgal.apps.kept import keep_worst
-from proxcgal.apps.moving import show_moving
-from proxcgal.sim.recording import read_recording
-from proxcgal.sim.replay import first_difference
-from proxcgal.sim.scenario import load_scenario
-from proxcgal.study.pool import Pool
+from proxcgal.cli import main
+from proxcgal.recording.reader import read_recording
+from proxcgal.recording.replay import first_difference
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.study.campaign_picture import show_moving
+from proxcgal.study.workers import Pool
+from proxcgal.study.worst_recordings import keep_worst
 
 SMALL = ("--scenario", "front_plane", "--runs", "2", "--set", "duration=0.2", "--workers", "1")
 ONE = (*SMALL[:3], "1", *SMALL[4:])
@@ -60,7 +60,7 @@ def test_the_command_beside_a_recording_repeats_it(
     table = pl.read_parquet(whole / "trials.parquet").filter(pl.col("name") == entry["name"])
     words = shlex.split(entry["command"])
     assert words[0] == "proxcgal"
-    assert cli.main([*words[1:], "--no-picture", "--quiet", "--out", "again"]) == 0
+    assert main.main([*words[1:], "--no-picture", "--quiet", "--out", "again"]) == 0
     again = json.loads(Path("again/summary.json").read_text())["controllers"]["wb"]
     for key, value in again.items():
         assert value == table[key][0]
@@ -140,7 +140,7 @@ def test_more_runs_go_on_where_fewer_ended(call: Call, whole: Path) -> None:
 
 def test_a_report_is_made_again_from_the_folder(whole: Path) -> None:
     before = (whole / "report.html").read_bytes()
-    assert cli.main(["report", str(whole)]) == 0
+    assert main.main(["report", str(whole)]) == 0
     assert (whole / "report.html").read_bytes() == before
     assert before.count(b"<img ") == 2
 

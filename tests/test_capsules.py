@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import proxcgal as px
-from proxcgal.errors import ModelError
+from proxcgal.core.errors import ModelError
 from proxcgal.models import fit_capsules
 from proxcgal.models.builtin import ga_ol
-from proxcgal.models.capsule_robot import read_capsule_robot
 from proxcgal.models.capsules import capsule_mesh, fit_capsule
+from proxcgal.models.formats.capsule_robot import read_capsule_robot
 
 Point = tuple[int, int, int]
 

@@ -17,16 +17,16 @@ import pytest
 from PIL import Image
 
 import proxcgal as px
-from proxcgal.apps import cli
-from proxcgal.apps.drawing import draw_motion
-from proxcgal.apps.replay import ReplayOptions, opens_page
-from proxcgal.sim.recording import read_recording
-from proxcgal.sim.scenario import load_scenario
-from proxcgal.sim.setup import Setup
-from proxcgal.study import motion
+from proxcgal.cli import main
+from proxcgal.cli.replay import ReplayOptions, opens_page
+from proxcgal.recording.reader import read_recording
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.scenario.setup import Setup
+from proxcgal.study import motion_picture
+from proxcgal.study.runs.pictures import draw_motion
 
 QUICK = ["--set", "duration=0.4", "--quiet"]
-PROGRAM = [sys.executable, "-c", "import sys; from proxcgal.apps.cli import main; sys.exit(main())"]
+PROGRAM = [sys.executable, "-c", "import sys; from proxcgal.cli.main import main; sys.exit(main())"]
 
 
 Call = Callable[..., Any]
@@ -37,7 +37,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A short run of two controllers."""
     folder = tmp_path_factory.mktemp("results") / "run"
     arguments = ["run", "front_plane", "--controller", "wb", "sm", "--out", str(folder)]
-    assert cli.main([*arguments, "--workers", "1", "--no-picture", *QUICK]) == 0
+    assert main.main([*arguments, "--workers", "1", "--no-picture", *QUICK]) == 0
     return folder
 
 
@@ -47,21 +47,21 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_help_names_every_command(call: Call) -> None:
     answer = call("--help")
     assert answer.code == 0
-    for command in cli.COMMANDS:
+    for command in main.COMMANDS:
         assert re.search(rf"^  {command}\b", answer.out, re.MULTILINE)
 
 
 def test_help_comes_without_loading_what_only_runs_need() -> None:
     heavy = {"mujoco", "matplotlib", "pinocchio", "trimesh", "tyro", "scipy", "pydantic"}
     code = (
-        "import sys; from proxcgal.apps.cli import main; main(['--help']);"
+        "import sys; from proxcgal.cli.main import main; main(['--help']);"
         f"print('loaded:', sorted({heavy!r} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.endswith("loaded: []\n")
 
 
-@pytest.mark.parametrize("command", cli.COMMANDS)
+@pytest.mark.parametrize("command", main.COMMANDS)
 def test_every_command_helps_with_an_example(call: Call, command: str) -> None:
     answer = call(command, "--help")
     assert answer.code == 0
@@ -313,8 +313,8 @@ def test_the_demo_runs_both_scenes_and_ends_with_the_path_of_its_report(call: Ca
 def test_the_moving_picture_shows_both_controllers(
     results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(motion, "FRAMES", 3)
-    monkeypatch.setattr(motion, "HELD", 0)
+    monkeypatch.setattr(motion_picture, "FRAMES", 3)
+    monkeypatch.setattr(motion_picture, "HELD", 0)
     for name in ("wb.mcap", "sm.mcap"):
         shutil.copy(results / name, tmp_path)
     scenario = load_scenario("front_plane")
@@ -323,7 +323,10 @@ def test_the_moving_picture_shows_both_controllers(
         pytest.skip(told)
     with Image.open(tmp_path / "motion.gif") as picture:
         assert getattr(picture, "n_frames", 1) == 3
-        assert picture.size == (2 * motion.PANE[0], motion.PANE[1] + motion.STRIP)
+        assert picture.size == (
+            2 * motion_picture.PANE[0],
+            motion_picture.PANE[1] + motion_picture.STRIP,
+        )
     assert {path.name for path in tmp_path.iterdir()} == {
         "wb.mcap", "sm.mcap", "motion.gif", "motion.png",
     }  # fmt: skip
@@ -337,9 +340,12 @@ def test_beside_a_person_the_still_shows_the_least_distance_of_all_runs(
     run, row = np.unravel_index(int(np.argmin(true)), np.shape(true))
     setup = Setup.of(recordings[0].settings.scenario)
     end = recordings[0].ticks[-1].given.time
-    assert motion._telling(setup, recordings) == (end, -1)
-    monkeypatch.setattr(motion, "HriScenario", type(setup.scenario))
-    assert motion._telling(setup, recordings) == (recordings[run].ticks[row].given.time, run)
+    assert motion_picture._telling(setup, recordings) == (end, -1)
+    monkeypatch.setattr(motion_picture, "HriScenario", type(setup.scenario))
+    assert motion_picture._telling(setup, recordings) == (
+        recordings[run].ticks[row].given.time,
+        run,
+    )
 
 
 def test_without_a_way_to_draw_a_run_keeps_its_numbers(
@@ -348,7 +354,7 @@ def test_without_a_way_to_draw_a_run_keeps_its_numbers(
     def refuse(*_: object, **__: object) -> None:
         raise px.SimulationError("cannot draw off screen")
 
-    monkeypatch.setattr(motion, "draw", refuse)
+    monkeypatch.setattr(motion_picture, "draw", refuse)
     shutil.copy(results / "wb.mcap", tmp_path)
     told = draw_motion(load_scenario("front_plane"), tmp_path, lambda _: None)
     assert told == "front_plane: no motion.gif: cannot draw off screen"

@@ -5,15 +5,15 @@ import numpy as np
 import pytest
 
 import proxcgal as px
-from proxcgal.sim.blind import blind_volume, distances, last_seen, volume_within
-from proxcgal.sim.coverage import Coverage, coverage_of, sightings
-from proxcgal.sim.eyes import Eyes
-from proxcgal.sim.frames import inverse, placed
-from proxcgal.sim.scenario import load_scenario
-from proxcgal.sim.setup import Setup
+from proxcgal.core.transforms import inverse, placed
+from proxcgal.evaluation.blind_volume import blind_volume, distances, last_seen, volume_within
+from proxcgal.evaluation.coverage import Coverage, coverage_of, sightings
+from proxcgal.evaluation.visibility import Eyes
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.scenario.setup import Setup
 from proxcgal.sim.source import SimulatedSource
-from proxcgal.sim.trial import run_trial
 from proxcgal.sim.world import World
+from proxcgal.trial.trial import run_trial
 
 IDEAL = ("simulation.sigma_floor=0.0", "simulation.sigma_ratio=0.0", "simulation.dropout=0.0")
 

@@ -7,10 +7,10 @@ import pytest
 from scipy import stats
 
 import proxcgal as px
-from proxcgal.sim.scenario import load_scenario
-from proxcgal.sim.truth import Truth
+from proxcgal.evaluation.ground_truth import Truth
+from proxcgal.scenario.loading import load_scenario
 from proxcgal.study.bootstrap import Interval, mean_interval, median_interval
-from proxcgal.study.draws import crosses, draw_scene, reachable
+from proxcgal.study.static.draws import crosses, draw_scene, reachable
 
 
 def test_draws_meet_what_is_promised_of_them() -> None:

@@ -9,20 +9,20 @@ import pytest
 
 import proxcgal as px
 from proxcgal import _core
-from proxcgal.errors import ConfigError
+from proxcgal.core.errors import ConfigError
+from proxcgal.recording.reader import Recorder, read_recording
+from proxcgal.recording.render import snapshots
+from proxcgal.scenario.keys import INPUT_FAULTS, Fault
+from proxcgal.scenario.loading import load_scenario
 from proxcgal.sim.faults import FaultInjector
-from proxcgal.sim.pictures import snapshots
-from proxcgal.sim.recording import Recorder, read_recording
-from proxcgal.sim.scenario import load_scenario
-from proxcgal.sim.scenario_keys import INPUT_FAULTS, Fault
-from proxcgal.sim.ticks import TickInput
-from proxcgal.sim.trial import run_trial
+from proxcgal.sim.tick import TickInput
 from proxcgal.study.campaign import Trial
-from proxcgal.study.fault_rows import DEGRADED, HOLD, ROWS, RUN, STOP
-from proxcgal.study.faults import KIND, perform, plan
+from proxcgal.study.faults.campaign import KIND, perform, plan
+from proxcgal.study.faults.cases import DEGRADED, HOLD, ROWS, RUN, STOP
+from proxcgal.study.faults.reliability_page import GOALS, page
+from proxcgal.study.faults.reliability_page import SHOWN as SHOWN_BY_TESTS
 from proxcgal.study.kind import Wishes
-from proxcgal.study.reliability import GOALS, page
-from proxcgal.study.reliability import SHOWN as SHOWN_BY_TESTS
+from proxcgal.trial.trial import run_trial
 
 SHOWN = (
     "sensor silent", "array silent", "range nan", "same payload", "scans out of order",

@@ -17,10 +17,11 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 import proxcgal as px
-from proxcgal.apps import results, view
-from proxcgal.apps.view import address, checked_token
-from proxcgal.apps.view.gate import Gate, close, serve
-from proxcgal.apps.view.messages import Bounds, between, one_of, switch
+from proxcgal.cli import view
+from proxcgal.cli.view import address, checked_token
+from proxcgal.study.runs import results
+from proxcgal.viewer.access import Gate, close, serve
+from proxcgal.viewer.client_messages import Bounds, between, one_of, switch
 
 SPOKEN = f"viser-v{viser.__version__}"
 TOKEN = "correct-horse-battery"

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from proxcgal.study.growth import fit_growth, student_quantile
-from proxcgal.study.sweep import Cell, formula, growth
+from proxcgal.study.timing.grid import Cell, formula, growth
+from proxcgal.study.timing.growth import fit_growth, student_quantile
 
 
 def made_cells(time: Callable[[float, float], float]) -> list[Cell]:

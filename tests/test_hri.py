@@ -9,21 +9,21 @@ import numpy as np
 import polars as pl
 import pytest
 
-from proxcgal.errors import ConfigError
-from proxcgal.sim.errand import Errand
-from proxcgal.sim.human.motion import move
-from proxcgal.sim.human.recorded import write_motion
-from proxcgal.sim.human.subject import draw_subject
-from proxcgal.sim.scenario import HriScenario, load_scenario
-from proxcgal.sim.trial import run_trial
-from proxcgal.sim.trial_log import sampled_ticks
-from proxcgal.study import hri
-from proxcgal.study.hri_figures import figures
-from proxcgal.study.hri_numbers import PAPER, analyse, held
-from proxcgal.study.hri_words import captions, introduction, listings, verdicts
+from proxcgal.core.errors import ConfigError
+from proxcgal.evaluation.trial_log import sampled_ticks
+from proxcgal.scenario.loading import HriScenario, load_scenario
+from proxcgal.scene.human.motion import move
+from proxcgal.scene.human.recorded import write_motion
+from proxcgal.scene.human.subject import draw_subject
+from proxcgal.sim.waypoints import Errand
+from proxcgal.study.hri import campaign as hri_campaign
+from proxcgal.study.hri.figures import figures
+from proxcgal.study.hri.layouts import JITTER_M, draw_layout
+from proxcgal.study.hri.metrics import PAPER, analyse, held
+from proxcgal.study.hri.texts import captions, introduction, listings, verdicts
 from proxcgal.study.kind import Wishes
-from proxcgal.study.layouts import JITTER_M, draw_layout
 from proxcgal.study.trials import robot_of
+from proxcgal.trial.trial import run_trial
 
 #: The study in short: half a second, the first signal alone.
 STEP = '{at=0.0, mark="P1", reach="T1", within=9.5, phase="T1"}'
@@ -143,7 +143,7 @@ def table_of(values: dict[str, dict[int, float]], phase: float = 0.25) -> pl.Dat
 
 @pytest.fixture
 def campaign() -> Any:
-    return hri.plan(Wishes(runs=1, seed=0, jitter=False, controllers=("wb",)))
+    return hri_campaign.plan(Wishes(runs=1, seed=0, jitter=False, controllers=("wb",)))
 
 
 MEANS = {"wb": {1: 0.30, 2: 0.34, 3: 0.38}, "sm": {1: 0.28, 2: 0.33, 3: 0.36}}
@@ -214,7 +214,7 @@ def test_only_the_papers_own_cell_is_compared_with_the_paper(
     path = tmp_path / "hri_task1.toml"
     path.write_text(load_scenario("hri_task1", changed).to_toml())
     wishes = Wishes(runs=1, seed=0, jitter=False, scenarios=(str(path),), controllers=("wb",))
-    assert hri.plan(wishes).notes["compared"] == rows
+    assert hri_campaign.plan(wishes).notes["compared"] == rows
 
 
 def test_rows_of_another_cell_have_no_figures_of_the_paper(campaign: Any) -> None:
@@ -246,7 +246,7 @@ def test_the_same_phase_in_two_scenes_is_refused(tmp_path: Path) -> None:
     path.write_text(load_scenario("hri_task1", ['name="hri_other"']).to_toml())
     wishes = Wishes(runs=1, seed=0, jitter=False, scenarios=("hri_task1", str(path)))
     with pytest.raises(ConfigError, match=r"other\.toml: phase H1.* hri_task1"):
-        hri.plan(wishes)
+        hri_campaign.plan(wishes)
 
 
 def test_a_recording_is_no_subject_that_is_drawn(tmp_path: Path) -> None:
@@ -255,13 +255,13 @@ def test_a_recording_is_no_subject_that_is_drawn(tmp_path: Path) -> None:
     write_motion(move(draw_subject(1), operator, 65.0), path)
     recording = (f'operator.recording="{path}"',)
     alone = Wishes(runs=1, seed=0, jitter=False, overrides=recording)
-    assert len(hri.plan(alone).trials) == 2 * 4
+    assert len(hri_campaign.plan(alone).trials) == 2 * 4
     for several in (
         Wishes(runs=2, seed=0, jitter=False, overrides=recording),
         Wishes(runs=1, seed=0, overrides=recording),
     ):
         with pytest.raises(ConfigError, match=r"operator\.recording .* --subjects 1 --no-jitter"):
-            hri.plan(several)
+            hri_campaign.plan(several)
 
 
 def test_a_recorded_person_is_told_and_no_subject(call: Callable[..., Any], tmp_path: Path) -> None:
@@ -320,10 +320,10 @@ def test_a_trial_beside_a_person_keeps_the_robots_limits() -> None:
     scenario = load_scenario("hri_task1", ("operator.subject=2", *SHORT))
     assert isinstance(scenario, HriScenario)
     log = run_trial(scenario, "wb", sparse_truth=True, truth_hz=15.0)
-    numbers = hri.numbers(log, scenario)
+    numbers = hri_campaign.numbers(log, scenario)
     assert numbers["finite"]
     assert numbers["limits_kept"]
-    assert set(numbers) == set(hri.COLUMNS)
+    assert set(numbers) == set(hri_campaign.COLUMNS)
     every = run_trial(scenario, "wb")
     samples = sampled_ticks(every.elapsed, 15.0)
     np.testing.assert_allclose(log.true_m[samples], every.true_m[samples], atol=1e-9)

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
 import proxcgal as px
-from proxcgal.sim.human.body import NAMES, PARTS, POINTS, poses, radii, segments, upright
-from proxcgal.sim.human.motion import HZ, Motion, move
-from proxcgal.sim.human.person import Person, person_of
-from proxcgal.sim.human.recorded import HEADER, read_motion, write_motion
-from proxcgal.sim.human.smooth import Glide, Track, minimum_jerk, slerp, two_bones
-from proxcgal.sim.human.subject import ARM, SHIN, THIGH, draw_subject
-from proxcgal.sim.scenario import HriScenario, load_scenario
+from proxcgal.scenario.loading import HriScenario, load_scenario
+from proxcgal.scene.human.body import NAMES, PARTS, POINTS, poses, radii, segments, upright
+from proxcgal.scene.human.motion import HZ, Motion, move
+from proxcgal.scene.human.person import Person, person_of
+from proxcgal.scene.human.recorded import HEADER, read_motion, write_motion
+from proxcgal.scene.human.smooth import Glide, Track, minimum_jerk, slerp, two_bones
+from proxcgal.scene.human.subject import ARM, SHIN, THIGH, draw_subject
 
 Array = NDArray[np.float64]
 

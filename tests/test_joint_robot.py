@@ -8,9 +8,9 @@ import pytest
 
 import proxcgal as px
 from proxcgal.models.limits import LIMITS
-from proxcgal.sim.scenario_joint import CONFIGURATIONS
-from proxcgal.sim.setup import posture_problems
-from proxcgal.sim.surfaces import Surfaces
+from proxcgal.models.surfaces import Surfaces
+from proxcgal.scenario.joint import CONFIGURATIONS
+from proxcgal.scenario.setup import posture_problems
 
 FREE = np.array(CONFIGURATIONS["free"])
 

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
 import proxcgal as px
-from proxcgal.apps import joint_pursuit
-from proxcgal.apps.joint_goals import goal_pose, reach_of
-from proxcgal.sim.finish import Ending
+from proxcgal.evaluation.termination import Ending
+from proxcgal.server import pursuit
+from proxcgal.server.goals import goal_pose, reach_of
 
 REACHED = (3.0, 0.291, 1.05)
 _robots: dict[str, px.Robot] = {}
@@ -80,7 +80,7 @@ def test_ticks_go_on_while_it_is_found_out_what_held_the_arm(
         assert known.wait(60.0)
         return replace(ending, reason="found out")
 
-    monkeypatch.setattr(joint_pursuit, "concluded", slowly)
+    monkeypatch.setattr(pursuit, "concluded", slowly)
     with server("joint_free", "finish.patience=0.2", "finish.progress=5.0") as arm:
         number = arm.send_goal(px.JointGoal(translation=REACHED, init="jl"))
         for _ in range(300):

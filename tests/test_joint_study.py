@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from proxcgal.errors import ConfigError
-from proxcgal.sim.scenario import CONTROLLERS
-from proxcgal.study.joint import KIND, PERCEPTIONS, SCENES, STACKS
-from proxcgal.study.joint_words import listings, verdicts
+from proxcgal.core.errors import ConfigError
+from proxcgal.scenario.loading import CONTROLLERS
+from proxcgal.study.joint.campaign import KIND, PERCEPTIONS, SCENES, STACKS
+from proxcgal.study.joint.texts import listings, verdicts
 from proxcgal.study.kind import Wishes
 
 KEYS = {

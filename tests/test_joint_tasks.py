@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 import proxcgal as px
-from proxcgal.sim import arms
-from proxcgal.sim.scenario import load_scenario, parse_scenario
-from proxcgal.sim.scenario_joint import CONFIGURATIONS, JointScenario
-from proxcgal.sim.setup import Setup
-from proxcgal.study.joint_rows import COLUMNS, numbers_of
+from proxcgal.models import macro_micro
+from proxcgal.scenario.joint import CONFIGURATIONS, JointScenario
+from proxcgal.scenario.loading import load_scenario, parse_scenario
+from proxcgal.scenario.setup import Setup
+from proxcgal.study.joint.metrics import COLUMNS, numbers_of
 from proxcgal.study.trials import simulate
 
 NOTHING = np.empty((0, 3))
@@ -39,7 +39,9 @@ def near_posture(robot: px.Robot, pairs: list[tuple[str, str]], within: float) -
 
 
 def test_self_collision_pushes_the_nearest_links_apart_at_its_rate(joint: px.Robot) -> None:
-    pairs = [pair for pair in arms.watched_pairs(joint, 6, 0.05) if pair[0].startswith("kuka_")]
+    pairs = [
+        pair for pair in macro_micro.watched_pairs(joint, 6, 0.05) if pair[0].startswith("kuka_")
+    ]
     q = near_posture(joint, pairs, 0.06)
     rows = [tuple(joint.link_names.index(name) for name in pair) for pair in pairs]
     out = tick(joint, [px.SelfCollision(pairs=pairs, nearest=1)], q)
@@ -58,7 +60,7 @@ def test_self_collision_pushes_the_nearest_links_apart_at_its_rate(joint: px.Rob
 
 
 def test_self_collision_watches_the_upper_arm_only(joint: px.Robot) -> None:
-    pairs = arms.watched_pairs(joint, 6, 0.05)
+    pairs = macro_micro.watched_pairs(joint, 6, 0.05)
     assert ("kuka_link_3", "ur10e_forearm_link") in pairs
     assert all(any(name.startswith("ur10e_") for name in pair) for pair in pairs)
     assert ("kuka_base_link", "kuka_link_3") not in pairs
@@ -87,11 +89,11 @@ def test_links_that_are_none_are_refused_by_name(joint: px.Robot) -> None:
 
 
 def test_an_arms_manipulability_is_a_share_of_its_largest(joint: px.Robot) -> None:
-    first, joints = arms.part(joint, 6, "micro")
-    unit = arms.largest_manipulability(joint, first, joints)
+    first, joints = macro_micro.part(joint, 6, "micro")
+    unit = macro_micro.largest_manipulability(joint, first, joints)
     rng = np.random.default_rng(1)
     q = rng.uniform(np.maximum(joint.q_min, -3), np.minimum(joint.q_max, 3))
-    J = arms.tool_jacobian(joint, q)[:, 6:]
+    J = macro_micro.tool_jacobian(joint, q)[:, 6:]
     share = float(np.sqrt(np.linalg.det(J @ J.T))) / unit
     assert 0.0 < share < 1.0
     task = px.Manipulability(first_joint=first, joints=joints, unit=unit, target=0.9, low=2, high=3)
@@ -103,7 +105,7 @@ def test_an_arms_manipulability_is_a_share_of_its_largest(joint: px.Robot) -> No
                                               low=5, high=9)], q).tasks[0].rate[0]  # fmt: skip
         assert rate < 0.0
     with pytest.raises(px.ConfigError, match="macro_joints = 12"):
-        arms.part(joint, 12, "macro")
+        macro_micro.part(joint, 12, "macro")
 
 
 @pytest.mark.parametrize(

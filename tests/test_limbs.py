@@ -4,10 +4,10 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from proxcgal.sim.frames import pose, rotation
-from proxcgal.sim.hands import Hands, LiveScene
-from proxcgal.sim.limbs import arms
-from proxcgal.sim.solids import Capsule, Solid, Sphere
+from proxcgal.core.transforms import pose, rotation
+from proxcgal.scene.arm_follower import arms
+from proxcgal.scene.dragging import Hands, LiveScene
+from proxcgal.scene.solids import Capsule, Solid, Sphere
 
 LENGTHS = (0.30, 0.26, 0.10)
 place = st.tuples(*[st.floats(-2.0, 2.0)] * 3)

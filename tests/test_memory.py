@@ -8,14 +8,14 @@ import pytest
 from numpy.typing import NDArray
 
 import proxcgal as px
-from proxcgal.sim.recorder import Recorder
-from proxcgal.sim.recording import read_recording
-from proxcgal.sim.replay import first_difference
-from proxcgal.sim.scenario import load_scenario
-from proxcgal.sim.setup import Setup
+from proxcgal.recording.reader import read_recording
+from proxcgal.recording.replay import first_difference
+from proxcgal.recording.writer import Recorder
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.scenario.setup import Setup
 from proxcgal.sim.source import SimulatedSource
-from proxcgal.sim.trial import run_trial
 from proxcgal.sim.world import World
+from proxcgal.trial.trial import run_trial
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from proxcgal.study.bootstrap import ratio_interval
-from proxcgal.study.memory_share import memory_sentences, memory_summary
+from proxcgal.study.static.memory_share import memory_sentences, memory_summary
 
 KINDS = ("in_view", "remembered", "forgotten", "never_seen")
 

@@ -7,7 +7,15 @@ import numpy as np
 import pytest
 
 import proxcgal as px
-from proxcgal.models.meshes import MAX_FACES, box, capsule, clean, cylinder, ellipsoid, load_mesh
+from proxcgal.models.mesh.files import (
+    MAX_FACES,
+    box,
+    capsule,
+    clean,
+    cylinder,
+    ellipsoid,
+    load_mesh,
+)
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 import proxcgal as px
-from proxcgal.models.decimation import decimate
-from proxcgal.models.meshes import box, cylinder, ellipsoid
-from proxcgal.models.resolution import control_mesh
-from proxcgal.models.subdivision import subdivide
-from proxcgal.models.triangles import (
+from proxcgal.models.mesh.decimation import decimate
+from proxcgal.models.mesh.files import box, cylinder, ellipsoid
+from proxcgal.models.mesh.resolution import control_mesh
+from proxcgal.models.mesh.subdivision import subdivide
+from proxcgal.models.mesh.triangles import (
     compact,
     double_areas,
     edges_of,

@@ -8,14 +8,14 @@ import pytest
 from scipy.stats import chi2
 
 import proxcgal as px
-from proxcgal.models import mounts
-from proxcgal.sim.mounting import SCANS, RealMounts
-from proxcgal.sim.scenario import Scenario, load_scenario
-from proxcgal.sim.scenario_keys import Fault
-from proxcgal.sim.setup import Setup
+from proxcgal.models import mount_check
+from proxcgal.scenario.keys import Fault
+from proxcgal.scenario.loading import Scenario, load_scenario
+from proxcgal.scenario.setup import Setup
+from proxcgal.sim.mount_faults import SCANS, RealMounts
 from proxcgal.sim.source import SimulatedSource
-from proxcgal.sim.trial import run_trial
 from proxcgal.sim.world import World
+from proxcgal.trial.trial import run_trial
 
 SCENES = ("front_plane", "side_plane", "timing_ur10e", "timing_panda")
 SIGNS = ("", "-")
@@ -103,7 +103,7 @@ def test_scans_of_another_skin_are_refused(setup: Setup) -> None:
 
 
 def test_the_threshold_is_passed_once_in_a_million() -> None:
-    assert pytest.approx(chi2.isf(1e-6, 6), rel=1e-5) == mounts.THRESHOLD
+    assert pytest.approx(chi2.isf(1e-6, 6), rel=1e-5) == mount_check.THRESHOLD
 
 
 def test_a_mount_fault_moves_only_its_sensor_and_only_for_its_time(setup: Setup) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from browser import Tab, until
 from live import Live
-from proxcgal.apps.view.gate import close, serve
+from proxcgal.viewer.access import close, serve
 
 
 @pytest.fixture(scope="module")

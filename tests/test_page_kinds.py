@@ -8,9 +8,9 @@ import numpy as np
 
 from browser import Tab, until
 from live import Live
-from proxcgal.apps.view.walk_panel import ENABLE
-from proxcgal.sim.setup import Setup
-from proxcgal.sim.truth import Truth
+from proxcgal.evaluation.ground_truth import Truth
+from proxcgal.scenario.setup import Setup
+from proxcgal.viewer.walkthrough_panel import ENABLE
 
 
 @contextmanager

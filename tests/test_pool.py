@@ -14,7 +14,7 @@ import pytest
 
 import proxcgal as px
 from proxcgal.study.jobs import StoppedError
-from proxcgal.study.pool import Pool, default_workers
+from proxcgal.study.workers import Pool, default_workers
 
 JOBS = """
 import os, signal, time

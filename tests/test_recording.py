@@ -12,12 +12,12 @@ from mcap.reader import make_reader
 from mcap.records import Message
 
 import proxcgal as px
-from proxcgal.sim import foxglove, packing
-from proxcgal.sim.frames import rotation
-from proxcgal.sim.recording import Recorder, Recording, Settings, read_recording
-from proxcgal.sim.scenario import load_scenario
-from proxcgal.sim.ticks import Found, TaskResult, Tick, TickInput, TickResult, TickTruth
-from proxcgal.sim.versions import versions
+from proxcgal.core.transforms import rotation
+from proxcgal.core.versions import versions
+from proxcgal.recording import codec, foxglove
+from proxcgal.recording.reader import Recorder, Recording, Settings, read_recording
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.sim.tick import Found, TaskResult, Tick, TickInput, TickResult, TickTruth
 
 SCENARIO = load_scenario("front_plane", ["seed=3"])
 SETTINGS = Settings(scenario=SCENARIO, controller="wb", seed=3, meshes={"a": "b"})
@@ -392,9 +392,9 @@ def test_another_programs_mcap_is_refused(tmp_path: Path) -> None:
 def test_whole_millimetres_take_two_bytes_a_zone_and_others_lose_nothing() -> None:
     generator = np.random.default_rng(0)
     whole, fine = (scan(generator, 0, whole=whole) for whole in (True, False))
-    assert len(packing.pack_scans([fine])) - len(packing.pack_scans([whole])) == 64 * 6
+    assert len(codec.pack_scans([fine])) - len(codec.pack_scans([whole])) == 64 * 6
     for original in (whole, fine):
-        assert plain(packing.unpack_scans(packing.pack_scans([original]))) == plain((original,))
+        assert plain(codec.unpack_scans(codec.pack_scans([original]))) == plain((original,))
 
 
 def test_damage_says_where_and_how_much_was_read(tmp_path: Path) -> None:

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from browser import Tab, until
-from proxcgal.apps.view.gate import close, serve
-from proxcgal.apps.view.replay_page import ReplayPage, said
-from proxcgal.apps.view.replayed import replayed
-from proxcgal.sim.recorder import Recorder
-from proxcgal.sim.recording import Recording, read_recording
-from proxcgal.sim.scenario import load_scenario
-from proxcgal.sim.trial import run_trial
+from proxcgal.recording.reader import Recording, read_recording
+from proxcgal.recording.writer import Recorder
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.trial.trial import run_trial
+from proxcgal.viewer.access import close, serve
+from proxcgal.viewer.replay_page import ReplayPage, said
+from proxcgal.viewer.replayed import replayed
 
 
 @pytest.fixture(scope="module")
@@ -107,7 +107,7 @@ def test_the_buttons_go_from_moment_to_moment_whatever_the_tick(tmp_path: Path) 
 
 
 def test_the_command_serves_a_recording_until_it_is_interrupted(recording: Recording) -> None:
-    program = "import sys; from proxcgal.apps.cli import main; sys.exit(main())"
+    program = "import sys; from proxcgal.cli.main import main; sys.exit(main())"
     options = ["replay", str(recording.path), "--view", "--port", "0"]
     command = [sys.executable, "-c", program, *options]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:

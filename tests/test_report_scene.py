@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 
 from browser import Tab, until
-from proxcgal.apps.report import write_report
-from proxcgal.apps.view.report_scene import replay_scene, still_scene
-from proxcgal.sim.recorder import Recorder
-from proxcgal.sim.scenario import load_scenario
-from proxcgal.sim.trial import run_trial
+from proxcgal.recording.writer import Recorder
+from proxcgal.report.report import write_report
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.trial.trial import run_trial
+from proxcgal.viewer.report_scene import replay_scene, still_scene
 from test_report import checked, make_run
 
 

@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from documented import rows_of
 from proxcgal import _core
-from proxcgal.errors import ConfigError
-from proxcgal.sim import toml
-from proxcgal.sim.scenario import Scenario, kinds, list_scenarios, load_scenario, parse_scenario
-from proxcgal.sim.scenario_joint import JointScenario
-from proxcgal.sim.setup import Setup
+from proxcgal.core import toml
+from proxcgal.core.errors import ConfigError
+from proxcgal.scenario.joint import JointScenario
+from proxcgal.scenario.loading import Scenario, kinds, list_scenarios, load_scenario, parse_scenario
+from proxcgal.scenario.setup import Setup
 
 DOCS = Path(__file__).parents[1] / "docs" / "scenarios.md"
 

@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 
 import proxcgal as px
 from proxcgal import _core
-from proxcgal.sim.decisive import half_box
-from proxcgal.sim.frames import inverse, placed, pose
-from proxcgal.sim.recording import Recorder, read_recording
-from proxcgal.sim.scenario import load_scenario
-from proxcgal.sim.scenario_keys import Obstacle
-from proxcgal.sim.scene import KnownCloud, ObstacleScene
-from proxcgal.sim.solids import Box, Capsule, Cylinder, Solid, Sphere
-from proxcgal.sim.trial import first_difference, run_trial
-from proxcgal.sim.truth import Truth
+from proxcgal.core.transforms import inverse, placed, pose
+from proxcgal.evaluation.ground_truth import Truth
+from proxcgal.evaluation.sparse_ground_truth import half_box
+from proxcgal.recording.reader import Recorder, read_recording
+from proxcgal.scenario.keys import Obstacle
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.scene.obstacles import KnownCloud, ObstacleScene
+from proxcgal.scene.solids import Box, Capsule, Cylinder, Solid, Sphere
 from proxcgal.sim.world import World
+from proxcgal.trial.trial import first_difference, run_trial
 
 Array = NDArray[np.float64]
 

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 
 import proxcgal as px
-from proxcgal.apps import serve
-from proxcgal.apps.cli import main
-from proxcgal.errors import ConfigError
+from proxcgal.cli import serve
+from proxcgal.cli.main import main
+from proxcgal.core.errors import ConfigError
 
 REACHED = (3.0, 0.291, 1.05)
 PATIENCE = 120.0  # [s] for what has to come, however busy the machine is
@@ -129,7 +129,7 @@ def test_cancel_and_refusals_are_answered(served: Served) -> None:
 
 def test_whoever_waits_for_a_goal_is_told_when_the_server_ends() -> None:
     with subprocess.Popen(
-        [sys.executable, "-c", "import sys; from proxcgal.apps.cli import main; sys.exit(main())",
+        [sys.executable, "-c", "import sys; from proxcgal.cli.main import main; sys.exit(main())",
          "serve", "--port", "0"], stderr=subprocess.PIPE, text=True,
     ) as process:  # fmt: skip
         assert process.stderr is not None

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import proxcgal as px
-from proxcgal.models.meshes import cylinder
+from proxcgal.models.mesh.files import cylinder
 
 STANDOFF = 0.01
 RINGS = [

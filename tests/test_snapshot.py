@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import proxcgal as px
-from proxcgal.sim.scenario import Scenario, load_scenario
-from proxcgal.sim.scenario_keys import Fault
-from proxcgal.sim.snapshot import Snapshot, take_snapshot
-from proxcgal.study.sweep_inputs import SCENARIOS
+from proxcgal.scenario.keys import Fault
+from proxcgal.scenario.loading import Scenario, load_scenario
+from proxcgal.sim.static_scan import Snapshot, take_snapshot
+from proxcgal.study.timing.inputs import SCENARIOS
 
 
 @pytest.fixture(scope="module")

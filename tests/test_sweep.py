@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 import proxcgal as px
-from proxcgal.apps import cli
-from proxcgal.sim.scenario import load_scenario
-from proxcgal.study import sweep
-from proxcgal.study.sweep import Cell, Effort, measure, sweep_summary, time_cells
-from proxcgal.study.sweep_inputs import Inputs, grid_inputs
-from proxcgal.study.sweep_ratios import compare, cycle_verdict, sweep_table
+from proxcgal.cli import main
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.study.timing import grid as timing_grid
+from proxcgal.study.timing.grid import Cell, Effort, measure, sweep_summary, time_cells
+from proxcgal.study.timing.inputs import Inputs, grid_inputs
+from proxcgal.study.timing.ratios import compare, cycle_verdict, sweep_table
 
 EFFORT = Effort(seconds=0.0, rounds=3, most=3)
 CELL_KEYS = [
@@ -75,14 +75,14 @@ def test_a_grid_has_both_algorithms_by_both_methods(grid: list[Inputs], cells: l
 def test_methods_that_disagree_are_not_timed(
     grid: list[Inputs], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    right = sweep.call_of
+    right = timing_grid.call_of
 
     def wrong(inputs: Inputs, algorithm: int, method: str) -> Callable[[], Any]:
         if (algorithm, method) == (1, "fast"):
             return lambda: np.zeros(len(inputs.points_W), bool)
         return right(inputs, algorithm, method)
 
-    monkeypatch.setattr(sweep, "call_of", wrong)
+    monkeypatch.setattr(timing_grid, "call_of", wrong)
     with pytest.raises(px.SimulationError, match=r"100 vertices, cloud raw: .*Algorithm 1"):
         next(time_cells(grid, EFFORT))
 
@@ -137,11 +137,11 @@ def written(arm_cell: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[P
     """A quick grid of the small arm, and what the command said."""
     folder = tmp_path_factory.mktemp("grid") / "out"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sweep, "QUICK", EFFORT)
+        patch.setattr(timing_grid, "QUICK", EFFORT)
         said: list[str] = []
         patch.setattr("builtins.print", lambda *words, **_: said.append(" ".join(map(str, words))))
         command = ["sweep", "--quick", "--scenario", str(arm_cell), "--out", str(folder)]
-        assert cli.main([*command, "--quiet"]) == 0
+        assert main.main([*command, "--quiet"]) == 0
     return folder, "\n".join(said)
 
 
@@ -210,7 +210,7 @@ def test_a_report_is_made_again_from_the_summary_alone(
     for cell in summary["cells"]:
         cell["robot"] = "<script>/../x"
     (tmp_path / "summary.json").write_text(json.dumps(summary))
-    assert cli.main(["report", str(tmp_path)]) == 0
+    assert main.main(["report", str(tmp_path)]) == 0
     page = page_of(tmp_path)
     assert "script" not in page.tags
     assert "<script>/../x" in page.text
@@ -220,7 +220,7 @@ def test_a_damaged_summary_is_told_with_its_key(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "summary.json").write_text('{"machine": "m", "cells": [{"robot": "r"}]}')
-    assert cli.main(["report", str(tmp_path)]) == 2
+    assert main.main(["report", str(tmp_path)]) == 2
     assert "cells.0.vertices" in capsys.readouterr().err
     assert not (tmp_path / "report.html").exists()
 
@@ -245,7 +245,7 @@ def test_bad_input_is_exit_2_and_writes_nothing(
     far = arm_cell.read_text().replace("[0.6, 0.0, 0.5]", "[1.6, 0.0, 0.5]")
     (tmp_path / "far.toml").write_text(far)
     monkeypatch.chdir(tmp_path)
-    assert cli.main(["sweep", "--quick", "--quiet", *arguments]) == 2
+    assert main.main(["sweep", "--quick", "--quiet", *arguments]) == 2
     captured = capsys.readouterr()
     assert captured.out == ""
     assert "Traceback" not in captured.err
@@ -261,9 +261,9 @@ def test_an_interrupted_grid_leaves_nothing(
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(sweep, "measure", interrupt)
+    monkeypatch.setattr(timing_grid, "measure", interrupt)
     out = tmp_path / "out"
     command = ["sweep", "--quick", "--quiet", "--scenario", str(arm_cell), "--out", str(out)]
-    assert cli.main(command) == 130
+    assert main.main(command) == 130
     assert "nothing was kept" in capsys.readouterr().err
     assert not out.exists()

@@ -16,20 +16,20 @@ from mcap.writer import Writer
 from PIL import Image
 
 import proxcgal as px
-from proxcgal.apps.moving import _draw
-from proxcgal.apps.results import warn_of_stopped
+from proxcgal.evaluation.trial_log import final_ticks
+from proxcgal.recording.reader import Recorder, Recording, read_recording
+from proxcgal.recording.render import animate, snapshots
+from proxcgal.recording.replay import Replay, recorded_log
+from proxcgal.scenario.keys import INPUT_FAULTS, Fault
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.scenario.setup import Setup
 from proxcgal.sim.faults import FaultInjector
-from proxcgal.sim.pictures import animate, snapshots
-from proxcgal.sim.ranges import NO_TARGET, VALID
-from proxcgal.sim.recording import Recorder, Recording, read_recording
-from proxcgal.sim.replay import Replay, recorded_log
-from proxcgal.sim.scenario import load_scenario
-from proxcgal.sim.scenario_keys import INPUT_FAULTS, Fault
-from proxcgal.sim.setup import Setup
-from proxcgal.sim.ticks import TickInput
-from proxcgal.sim.trial import TrialLog, first_difference, recompute, run_trial
-from proxcgal.sim.trial_log import final_ticks
+from proxcgal.sim.range_sensor import NO_TARGET, VALID
+from proxcgal.sim.tick import TickInput
+from proxcgal.study.campaign_picture import _draw
+from proxcgal.study.runs.results import warn_of_stopped
 from proxcgal.study.trials import simulate
+from proxcgal.trial.trial import TrialLog, first_difference, recompute, run_trial
 
 SHORT = ["duration=1.0"]
 NAMES = [f"s{row}" for row in range(4)]

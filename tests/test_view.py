@@ -16,19 +16,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import proxcgal as px
-from proxcgal.apps.view.choice import Choice, robots
-from proxcgal.apps.view.desk import ROOM, Desk
-from proxcgal.apps.view.exchange import Told, Wishes
-from proxcgal.apps.view.preparation import Preparation
-from proxcgal.apps.view.simulation import simulate
-from proxcgal.models.display import display_meshes
-from proxcgal.sim.frames import pose
-from proxcgal.sim.hands import Hands, LiveScene
-from proxcgal.sim.live import STOP, LiveTrial
+from proxcgal.core.transforms import pose
+from proxcgal.models.mesh.display import display_meshes
+from proxcgal.scenario.keys import Fault
+from proxcgal.scenario.loading import Scenario, load_scenario
+from proxcgal.scene.dragging import Hands, LiveScene
 from proxcgal.sim.moment import without
-from proxcgal.sim.scenario import Scenario, load_scenario
-from proxcgal.sim.scenario_keys import Fault
-from proxcgal.sim.trial import run_trial
+from proxcgal.trial.interactive import STOP, LiveTrial
+from proxcgal.trial.trial import run_trial
+from proxcgal.viewer.choice import Choice, robots
+from proxcgal.viewer.command_queue import ROOM, Desk
+from proxcgal.viewer.messages import Told, Wishes
+from proxcgal.viewer.preparation import Preparation
+from proxcgal.viewer.simulation import simulate
 
 RNG = np.random.default_rng(1)
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from proxcgal.sim.live import LiveTrial
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.scenario.walkthrough import WalkScenario
 from proxcgal.sim.moment import Moment
-from proxcgal.sim.scenario import load_scenario
-from proxcgal.sim.walk.grip import ACCELERATION, HAND, SPEED, Grip
-from proxcgal.sim.walk.keys import WalkScenario
-from proxcgal.sim.walk.live import WalkTrial
-from proxcgal.sim.walk.setup import PERIOD
+from proxcgal.trial.interactive import LiveTrial
+from proxcgal.trial.walkthrough.grip import ACCELERATION, HAND, SPEED, Grip
+from proxcgal.trial.walkthrough.interactive import WalkTrial
+from proxcgal.trial.walkthrough.setup import PERIOD
 
 
 @pytest.fixture

@@ -19,28 +19,34 @@ import polars as pl
 import pytest
 
 from documented import rows_of
-from proxcgal.apps.walkthrough import lines_of
-from proxcgal.errors import ConfigError, RecordingError, SimulationError
+from proxcgal.core.errors import ConfigError, RecordingError, SimulationError
 from proxcgal.models.builtin import ga_ol
+from proxcgal.scenario.loading import load_scenario, parse_scenario
+from proxcgal.scenario.walkthrough import GuidedScenario, Leg, WalkScenario
 from proxcgal.sim.physics import Physics
-from proxcgal.sim.scenario import load_scenario, parse_scenario
-from proxcgal.sim.trial import run_trial
-from proxcgal.sim.walk import playback
-from proxcgal.sim.walk.guided import off_path
-from proxcgal.sim.walk.keys import GuidedScenario, Leg, WalkScenario
-from proxcgal.sim.walk.log import WalkLog
-from proxcgal.sim.walk.playback import check_start, play
-from proxcgal.sim.walk.poses import PoseRecorder, read_poses
-from proxcgal.sim.walk.run import WalkResult, run_walk
-from proxcgal.sim.walk.setup import PERIOD, WalkSetup
-from proxcgal.sim.walk.stops import STRETCHED, not_worst, worst_stops
-from proxcgal.sim.walk.taught import TaughtPath, clean, to_csv, to_trajectory, tool_positions
-from proxcgal.sim.walk.teach import REACHED, teach
-from proxcgal.sim.walk.wish import Wish
 from proxcgal.study.figures import GREY
-from proxcgal.study.ratings import read_ratings
-from proxcgal.study.walk import figures
-from proxcgal.study.walk_figures import trip_figure
+from proxcgal.study.runs.walkthrough import lines_of
+from proxcgal.study.walkthrough.campaign import figures
+from proxcgal.study.walkthrough.figures import trip_figure
+from proxcgal.study.walkthrough.ratings import read_ratings
+from proxcgal.trial.trial import run_trial
+from proxcgal.trial.walkthrough import playback
+from proxcgal.trial.walkthrough.guided import off_path
+from proxcgal.trial.walkthrough.intended_path import Wish
+from proxcgal.trial.walkthrough.log import WalkLog
+from proxcgal.trial.walkthrough.playback import check_start, play
+from proxcgal.trial.walkthrough.poses import PoseRecorder, read_poses
+from proxcgal.trial.walkthrough.run import WalkResult, run_walk
+from proxcgal.trial.walkthrough.setup import PERIOD, WalkSetup
+from proxcgal.trial.walkthrough.stops import STRETCHED, not_worst, worst_stops
+from proxcgal.trial.walkthrough.taught import (
+    TaughtPath,
+    clean,
+    to_csv,
+    to_trajectory,
+    tool_positions,
+)
+from proxcgal.trial.walkthrough.teach import REACHED, teach
 
 ROOT = Path(__file__).parents[1]
 DOCS, SCENARIOS = ROOT / "docs" / "walkthrough.md", ROOT / "docs" / "scenarios.md"
@@ -188,10 +194,10 @@ def test_exports_hold_the_path(short: WalkSetup, path: TaughtPath) -> None:
 
 _TEACH = """
 import os, signal, sys
-from proxcgal.sim.scenario import load_scenario
-from proxcgal.sim.walk.poses import PoseRecorder
-from proxcgal.sim.walk.setup import WalkSetup
-from proxcgal.sim.walk.teach import teach
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.trial.walkthrough.poses import PoseRecorder
+from proxcgal.trial.walkthrough.setup import WalkSetup
+from proxcgal.trial.walkthrough.teach import teach
 setup = WalkSetup.of(load_scenario("walkthrough_teach"))
 class Killed(PoseRecorder):
     def write(self, *pose):

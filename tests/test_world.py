@@ -8,16 +8,16 @@ import trimesh
 from numpy.typing import NDArray
 
 import proxcgal as px
-from proxcgal.sim.decisive import decisive_truth
-from proxcgal.sim.frames import placed
-from proxcgal.sim.ranges import NO_TARGET, VALID, RangeModel
-from proxcgal.sim.scenario import load_scenario
-from proxcgal.sim.scenario_keys import Obstacle, Sensor, Simulation
-from proxcgal.sim.scene import ObstacleScene
-from proxcgal.sim.setup import Setup
+from proxcgal.core.transforms import placed
+from proxcgal.evaluation.ground_truth import Truth
+from proxcgal.evaluation.sparse_ground_truth import decisive_truth
+from proxcgal.models.surfaces import ALWAYS_NEAR, Surfaces
+from proxcgal.scenario.keys import Obstacle, Sensor, Simulation
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.scenario.setup import Setup
+from proxcgal.scene.obstacles import ObstacleScene
+from proxcgal.sim.range_sensor import NO_TARGET, VALID, RangeModel
 from proxcgal.sim.source import SimulatedSource
-from proxcgal.sim.surfaces import ALWAYS_NEAR, Surfaces
-from proxcgal.sim.truth import Truth
 from proxcgal.sim.world import Arrow, Camera, Spheres, World, mujoco
 
 Array = NDArray[np.float64]

@@ -7,9 +7,9 @@ namespace nb = nanobind;
 
 namespace {
 
-/// The Python class of that name in proxcgal.errors: they are defined there once.
+/// The Python class of that name in proxcgal.core.errors: they are defined there once.
 void raise(const char* name, const char* message) {
-  const nb::object type = nb::module_::import_("proxcgal.errors").attr(name);
+  const nb::object type = nb::module_::import_("proxcgal.core.errors").attr(name);
   PyErr_SetString(type.ptr(), message);
 }
 

@@ -61,7 +61,7 @@ from proxcgal._core import (
     solve,
     zone_directions,
 )
-from proxcgal.errors import (
+from proxcgal.core.errors import (
     ConfigError,
     GeometryError,
     ModelError,
@@ -83,8 +83,8 @@ from proxcgal.models import (
 )
 
 if TYPE_CHECKING:
-    from proxcgal.apps.joint_goals import GoalRefusedError, JointGoal
-    from proxcgal.apps.joint_server import JointRobotServer
+    from proxcgal.server.goals import GoalRefusedError, JointGoal
+    from proxcgal.server.joint_server import JointRobotServer
 
 __version__ = _version("proxcgal")
 
@@ -163,9 +163,9 @@ __all__ = [
 
 #: Made on first use: they need the simulator, which takes longer to import than all the rest.
 _LATER = {
-    "GoalRefusedError": "proxcgal.apps.joint_goals",
-    "JointGoal": "proxcgal.apps.joint_goals",
-    "JointRobotServer": "proxcgal.apps.joint_server",
+    "GoalRefusedError": "proxcgal.server.goals",
+    "JointGoal": "proxcgal.server.goals",
+    "JointRobotServer": "proxcgal.server.joint_server",
 }
 
 

@@ -25,8 +25,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 from proxcgal import _core
-from proxcgal.sim.scenario import load_scenario
-from proxcgal.sim.setup import Setup
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.scenario.setup import Setup
 
 try:
     from rclpy.experimental import EventsExecutor as Executor

@@ -13,7 +13,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.task import Future
 
-from proxcgal.apps.joint_goals import BASE, GoalRefusedError, GoalResult, JointGoal
+from proxcgal.server.goals import BASE, GoalRefusedError, GoalResult, JointGoal
 from proxcgal_ros import topics
 from proxcgal_ros.convert import header
 from proxcgal_ros.goals import GoalServer

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from rosbags.highlevel import AnyReader
 
-from proxcgal.errors import ConfigError
+from proxcgal.core.errors import ConfigError
+from proxcgal.recording.writer import Recorder, Settings
+from proxcgal.scenario.loading import Scenario, change_scenario, load_scenario, parse_scenario
+from proxcgal.scenario.setup import Setup
 from proxcgal.sim.loop import run_ticks
-from proxcgal.sim.recorder import Recorder, Settings
-from proxcgal.sim.scenario import Scenario, change_scenario, load_scenario, parse_scenario
-from proxcgal.sim.setup import Setup
 from proxcgal.sim.source import RecordedSource
-from proxcgal.sim.ticks import UNKNOWN, Tick, TickInput, TickResult
+from proxcgal.sim.tick import UNKNOWN, Tick, TickInput, TickResult
 from proxcgal_ros import topics
 from proxcgal_ros.bags import decoded, typestore
 from proxcgal_ros.convert import SECOND, joint_positions, nanoseconds, pose_of, scans_of

@@ -14,11 +14,11 @@ from rclpy.serialization import serialize_message
 from rosbags.rosbag2 import StoragePlugin, Writer
 from std_msgs.msg import String
 
-from proxcgal.errors import ConfigError
-from proxcgal.sim.recording import Recording, read_recording
-from proxcgal.sim.replay import Replay
-from proxcgal.sim.setup import Setup
-from proxcgal.sim.ticks import Tick
+from proxcgal.core.errors import ConfigError
+from proxcgal.recording.reader import Recording, read_recording
+from proxcgal.recording.replay import Replay
+from proxcgal.scenario.setup import Setup
+from proxcgal.sim.tick import Tick
 from proxcgal_ros import topics
 from proxcgal_ros.bags import exact, typestore
 from proxcgal_ros.convert import (

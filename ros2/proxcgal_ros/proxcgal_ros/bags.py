@@ -10,7 +10,7 @@ from typing import Any
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
-from proxcgal.errors import ConfigError
+from proxcgal.core.errors import ConfigError
 
 MESSAGES = "proxcgal_msgs"
 _HEAD = 4  # of a serialized message: byte order

@@ -13,7 +13,7 @@ from typing import NoReturn
 
 from rclpy.utilities import remove_ros_args
 
-from proxcgal.errors import ConfigError, ProxError
+from proxcgal.core.errors import ConfigError, ProxError
 from proxcgal_ros.processes import PARAMETERS, spinning
 
 
@@ -76,7 +76,7 @@ def _node(options: argparse.Namespace, arguments: list[str]) -> int:
 def _sim(options: argparse.Namespace, arguments: list[str]) -> int:
     from contextlib import nullcontext
 
-    from proxcgal.sim.scenario import load_scenario
+    from proxcgal.scenario.loading import load_scenario
     from proxcgal_ros.sim import SimulatedArm, SimulatedSensors, sensors_beside
 
     seed = [] if options.seed is None else [f"seed={options.seed}"]

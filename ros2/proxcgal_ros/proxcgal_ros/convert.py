@@ -15,7 +15,7 @@ from sensor_msgs.msg import JointState, PointCloud2, PointField
 from std_msgs.msg import Float64MultiArray, Header, MultiArrayDimension
 
 from proxcgal import _core
-from proxcgal.sim.ticks import TickResult
+from proxcgal.sim.tick import TickResult
 from proxcgal_ros.restarts import Restarts
 
 Array = NDArray[np.float64]

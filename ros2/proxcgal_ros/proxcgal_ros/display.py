@@ -13,7 +13,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from proxcgal import _core
 from proxcgal.models import Robot
-from proxcgal.sim.ticks import TickResult
+from proxcgal.sim.tick import TickResult
 from proxcgal_ros.convert import point
 
 Array = NDArray[np.float64]

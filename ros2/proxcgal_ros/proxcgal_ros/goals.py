@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Protocol
 
-from proxcgal.apps.joint_goals import END_EFFECTOR, GoalFeedback, GoalResult, JointGoal
+from proxcgal.server.goals import END_EFFECTOR, GoalFeedback, GoalResult, JointGoal
 
 
 class GoalServer(Protocol):

@@ -8,8 +8,8 @@ from rclpy.executors import Executor
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
-from proxcgal.apps.joint_goals import GoalFeedback, GoalResult, JointGoal
-from proxcgal.apps.joint_server import JointRobotServer
+from proxcgal.server.goals import GoalFeedback, GoalResult, JointGoal
+from proxcgal.server.joint_server import JointRobotServer
 from proxcgal_ros import topics
 from proxcgal_ros.action import MoveRobotAction
 from proxcgal_ros.convert import header, joint_message

@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxcgal import _core
-from proxcgal.apps.goal_ledger import GoalLedger, Pursued
-from proxcgal.apps.joint_goals import (
+from proxcgal.evaluation.termination import Outcome, pose_errors
+from proxcgal.models import Robot
+from proxcgal.server.goal_ledger import GoalLedger, Pursued
+from proxcgal.server.goals import (
     BASE,
     GoalFeedback,
     GoalRefusedError,
@@ -19,9 +21,7 @@ from proxcgal.apps.joint_goals import (
     reach_of,
     reach_problem,
 )
-from proxcgal.models import Robot
-from proxcgal.sim.finish import Outcome, pose_errors
-from proxcgal.sim.ticks import TickInput, TickResult
+from proxcgal.sim.tick import TickInput, TickResult
 from proxcgal_ros.goals import goal_problems
 
 Array = NDArray[np.float64]

@@ -17,14 +17,14 @@ from sensor_msgs.msg import PointCloud2
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
-from proxcgal.errors import ConfigError
+from proxcgal.core.errors import ConfigError
 from proxcgal.models import check_mounts
+from proxcgal.recording.writer import Recorder, Settings
+from proxcgal.scenario.loading import CONTROLLERS, change_scenario, load_scenario
+from proxcgal.scenario.setup import Setup
 from proxcgal.sim.loop import run_ticks
-from proxcgal.sim.mounting import SCANS
-from proxcgal.sim.recorder import Recorder, Settings
-from proxcgal.sim.scenario import CONTROLLERS, change_scenario, load_scenario
-from proxcgal.sim.setup import Setup
-from proxcgal.sim.ticks import UNKNOWN, Tick, TickInput, TickResult
+from proxcgal.sim.mount_faults import SCANS
+from proxcgal.sim.tick import UNKNOWN, Tick, TickInput, TickResult
 from proxcgal_ros import parameters, topics
 from proxcgal_ros.action import MoveRobotAction
 from proxcgal_ros.clocks import Clocks

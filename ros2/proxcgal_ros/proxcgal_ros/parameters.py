@@ -18,7 +18,7 @@ from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValu
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from proxcgal.errors import ConfigError
+from proxcgal.core.errors import ConfigError
 
 SECOND_GOAL = ("preempt", "refuse")
 

@@ -10,7 +10,7 @@ from types import FrameType
 import rclpy
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 
-from proxcgal.errors import ConfigError
+from proxcgal.core.errors import ConfigError
 
 try:  # much less time a message, where this ROS 2 has it
     from rclpy.experimental import EventsExecutor

@@ -23,11 +23,11 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
-from proxcgal.sim.decisive import decisive_truth
-from proxcgal.sim.scenario import Scenario
-from proxcgal.sim.setup import Setup
+from proxcgal.evaluation.sparse_ground_truth import decisive_truth
+from proxcgal.evaluation.trial_log import NOTHING, TOO_CLOSE, final_ticks
+from proxcgal.scenario.loading import Scenario
+from proxcgal.scenario.setup import Setup
 from proxcgal.sim.source import SimulatedSource
-from proxcgal.sim.trial_log import NOTHING, TOO_CLOSE, final_ticks
 from proxcgal.sim.world import Hits, World
 from proxcgal_ros import topics
 from proxcgal_ros.convert import (

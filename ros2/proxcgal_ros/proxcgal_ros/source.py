@@ -14,8 +14,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 from proxcgal import _core
-from proxcgal.sim.setup import Setup
-from proxcgal.sim.ticks import TickInput
+from proxcgal.scenario.setup import Setup
+from proxcgal.sim.tick import TickInput
 from proxcgal_ros import topics
 from proxcgal_ros.clocks import Clocks
 from proxcgal_ros.convert import (

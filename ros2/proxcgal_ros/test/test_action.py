@@ -7,8 +7,8 @@ from action_msgs.msg import GoalStatus
 from proxcgal_msgs.msg import Proximity
 
 from conftest import PATIENT, Client, Processes, endless_goal, goal
-from proxcgal.sim.scenario import load_scenario
-from proxcgal.sim.setup import Setup
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.scenario.setup import Setup
 
 
 @pytest.fixture

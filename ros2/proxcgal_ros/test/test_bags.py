@@ -19,11 +19,11 @@ from rclpy.serialization import deserialize_message
 from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import JointState, PointCloud2
 
-from proxcgal.errors import ConfigError
-from proxcgal.sim.recorder import Recorder
-from proxcgal.sim.recording import Recording, read_recording
-from proxcgal.sim.scenario import load_scenario
-from proxcgal.sim.trial import run_trial
+from proxcgal.core.errors import ConfigError
+from proxcgal.recording.reader import Recording, read_recording
+from proxcgal.recording.writer import Recorder
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.trial.trial import run_trial
 
 
 @pytest.fixture(scope="module")
@@ -165,9 +165,9 @@ def test_quaternions_are_the_rotations_they_stand_for(seed: int) -> None:
 def test_a_pose_goes_through_a_message_unchanged() -> None:
     from proxcgal_ros.convert import header, pose_message
 
-    from proxcgal.sim import frames
+    from proxcgal.core import transforms
 
-    T_WT = frames.pose([0.3, -0.2, 0.9], [0.1, 1.2, -3.0])
+    T_WT = transforms.pose([0.3, -0.2, 0.9], [0.1, 1.2, -3.0])
     np.testing.assert_allclose(
         pose_of(pose_message(T_WT, header(0, "base_link"))), T_WT, atol=1e-12
     )

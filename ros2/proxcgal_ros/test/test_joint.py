@@ -10,7 +10,7 @@ from action_msgs.msg import GoalStatus
 from conftest import Client, Processes, goal
 
 pytestmark = pytest.mark.skipif(
-    importlib.util.find_spec("proxcgal.apps.joint_server") is None,
+    importlib.util.find_spec("proxcgal.server.joint_server") is None,
     reason="proxcgal has no 12-joint action server",
 )
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from proxcgal_ros.live_goals import LiveGoals, Rules
 
-from proxcgal.apps.joint_goals import GoalRefusedError, GoalResult, JointGoal
-from proxcgal.sim.scenario import load_scenario
-from proxcgal.sim.setup import Setup
-from proxcgal.sim.ticks import TickInput, TickResult
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.scenario.setup import Setup
+from proxcgal.server.goals import GoalRefusedError, GoalResult, JointGoal
+from proxcgal.sim.tick import TickInput, TickResult
 
 PERIOD = 0.01
 

@@ -11,10 +11,10 @@ from proxcgal_msgs.msg import Proximity
 from proxcgal_ros.source import OVERDUE
 
 from conftest import PATIENT, Client, Processes, goal
-from proxcgal.sim.recording import read_recording
-from proxcgal.sim.scenario import load_scenario
-from proxcgal.sim.setup import Setup
-from proxcgal.sim.trial import run_trial
+from proxcgal.recording.reader import read_recording
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.scenario.setup import Setup
+from proxcgal.trial.trial import run_trial
 
 SCENE = "front_plane"
 LONG = "duration=24.0"  # twice the scene's: time that a busy machine loses has been made up by then

@@ -27,9 +27,9 @@ from conftest import (
     goal,
     joint_bounds,
 )
-from proxcgal.sim.recording import read_recording
-from proxcgal.sim.scenario import load_scenario
-from proxcgal.sim.setup import Setup
+from proxcgal.recording.reader import read_recording
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.scenario.setup import Setup
 
 
 def started(processes: Processes, client: Client, *arguments: str) -> Client:

@@ -13,9 +13,9 @@ from proxcgal_ros.convert import SECOND, header, joint_message
 from proxcgal_ros.source import RosSource
 from sensor_msgs.msg import JointState
 
-from proxcgal.sim.scenario import load_scenario
-from proxcgal.sim.setup import Setup
-from proxcgal.sim.ticks import TickInput
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.scenario.setup import Setup
+from proxcgal.sim.tick import TickInput
 
 
 class Script:

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from proxcgal.errors import GeometryError, ModelError
+from proxcgal.core.errors import GeometryError, ModelError
 from proxcgal.models.joining import joined, rigid
-from proxcgal.models.meshes import check_mesh, clean, load_mesh
-from proxcgal.models.resolution import ControlMesh, check_resolution, control_mesh
+from proxcgal.models.mesh.files import check_mesh, clean, load_mesh
+from proxcgal.models.mesh.resolution import ControlMesh, check_resolution, control_mesh
+from proxcgal.models.mesh.triangles import Floats, Ints
 from proxcgal.models.robots import Robot
-from proxcgal.models.triangles import Floats, Ints
 
 Mesh = str | os.PathLike[str] | tuple[ArrayLike, ArrayLike]
 

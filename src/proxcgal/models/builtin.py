@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from proxcgal.errors import ModelError
+from proxcgal.core.errors import ModelError
 from proxcgal.models.description import Frame, RobotDescription
+from proxcgal.models.formats.load import read_description
 from proxcgal.models.joining import joined
 from proxcgal.models.limits import LIMITS, Limits, with_limits
-from proxcgal.models.read import read_description
 
 if TYPE_CHECKING:
-    from proxcgal.models.capsule_robot import CapsuleRobot
+    from proxcgal.models.formats.capsule_robot import CapsuleRobot
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ def _kr150() -> RobotDescription:
 @functools.cache
 def ga_ol() -> CapsuleRobot:
     """The painting arm of [WT] as its capsules, masses and brakes; its lengths are ours."""
-    from proxcgal.models.capsule_robot import read_capsule_robot  # loads pydantic
+    from proxcgal.models.formats.capsule_robot import read_capsule_robot  # loads pydantic
 
     return read_capsule_robot(_GA_OL)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from proxcgal._core import Capsule, LinkCapsule
-from proxcgal.models.triangles import Floats, Ints
+from proxcgal.models.mesh.triangles import Floats, Ints
 
 if TYPE_CHECKING:
     from proxcgal.models.robots import Robot

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
-from proxcgal.errors import ModelError
-from proxcgal.models.triangles import Floats, Ints
+from proxcgal.core.errors import ModelError
+from proxcgal.models.mesh.triangles import Floats, Ints
 
 JointType = Literal["revolute", "prismatic"]
 

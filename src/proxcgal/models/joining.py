@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from proxcgal.errors import ModelError
+from proxcgal.core.errors import ModelError
 from proxcgal.models.description import Frame, Joint, Link, RobotDescription, listed
-from proxcgal.models.triangles import Floats
+from proxcgal.models.mesh.triangles import Floats
 
 
 def joined(

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from proxcgal.errors import ModelError
+from proxcgal.core.errors import ModelError
 from proxcgal.models.description import Joint, RobotDescription, listed
-from proxcgal.models.triangles import Floats
+from proxcgal.models.mesh.triangles import Floats
 
 PerJoint = float | Sequence[float] | Mapping[str, float]
 

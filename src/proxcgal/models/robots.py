@@ -15,15 +15,20 @@ from typing import Any
 import numpy as np
 
 from proxcgal import _core
-from proxcgal.errors import ConfigError, ModelError, ModelWarning
+from proxcgal.core.cache import hash_mesh
+from proxcgal.core.errors import ConfigError, ModelError, ModelWarning
 from proxcgal.models.builtin import BUILTIN, list_robots
-from proxcgal.models.cache import hash_mesh
 from proxcgal.models.description import RobotDescription, listed
+from proxcgal.models.formats.load import read_description
+from proxcgal.models.formats.paths import SUFFIXES, is_robot_file
 from proxcgal.models.limits import PerJoint, with_limits
-from proxcgal.models.paths import SUFFIXES, is_robot_file
-from proxcgal.models.read import read_description
-from proxcgal.models.resolution import COUNT_TOLERANCE, ControlMesh, check_resolution, control_mesh
-from proxcgal.models.triangles import Floats, Ints
+from proxcgal.models.mesh.resolution import (
+    COUNT_TOLERANCE,
+    ControlMesh,
+    check_resolution,
+    control_mesh,
+)
+from proxcgal.models.mesh.triangles import Floats, Ints
 
 __all__ = ["Robot", "list_robots", "load_robot"]
 

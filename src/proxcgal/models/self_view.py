@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxcgal import _core
+from proxcgal.models.mesh.triangles import Floats
 from proxcgal.models.robots import Robot
-from proxcgal.models.triangles import Floats
 
 _MOUNTING = 0.005  # [m] of each ray, as `filter.min_hit`
 _known: dict[str, list[_core.MeshTree]] = {}

@@ -8,10 +8,10 @@ from typing import Literal
 import numpy as np
 
 from proxcgal import _core
-from proxcgal.errors import ConfigError, GeometryError, ModelError
-from proxcgal.models.meshes import FARTHEST
+from proxcgal.core.errors import ConfigError, GeometryError, ModelError
+from proxcgal.models.mesh.files import FARTHEST
+from proxcgal.models.mesh.triangles import Floats, Ints, is_number
 from proxcgal.models.robots import Robot
-from proxcgal.models.triangles import Floats, Ints, is_number
 
 _AXES = ("x", "y", "z")
 # Two longest sides are equal within this share; a link is flat whose third is below this one.

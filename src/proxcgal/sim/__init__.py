@@ -1,1 +1,1 @@
-"""Scenarios, the simulated world, one run and its durable log."""
+"""The simulated world, sensors and arm, and the loop through the tick."""

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from proxcgal import _core
-from proxcgal.errors import ConfigError
-from proxcgal.sim.ranges import NO_TARGET, VALID, ZONES
-from proxcgal.sim.scenario_keys import FAULT_VALUES, INPUT_FAULTS, MOUNT_FAULTS, Fault
-from proxcgal.sim.ticks import TickInput
+from proxcgal.core.errors import ConfigError
+from proxcgal.scenario.keys import FAULT_VALUES, INPUT_FAULTS, MOUNT_FAULTS, Fault
+from proxcgal.sim.range_sensor import NO_TARGET, VALID, ZONES
+from proxcgal.sim.tick import TickInput
 
 _STREAM = 2  # of the seed; the sensors' noise draws from another
 

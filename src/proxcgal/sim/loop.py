@@ -9,9 +9,9 @@ from itertools import count
 import numpy as np
 
 from proxcgal import _core
-from proxcgal.sim.scene import Cloud, FixedCloud
+from proxcgal.scene.obstacles import Cloud, FixedCloud
 from proxcgal.sim.source import Source
-from proxcgal.sim.ticks import TickInput, TickResult
+from proxcgal.sim.tick import TickInput, TickResult
 
 
 def run_ticks(

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxcgal import _core
-from proxcgal.sim.setup import Setup
-from proxcgal.sim.ticks import TickInput, TickResult
+from proxcgal.scenario.setup import Setup
+from proxcgal.sim.tick import TickInput, TickResult
 
 Array = NDArray[np.float64]
 Points = NDArray[np.float32]

@@ -15,8 +15,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from proxcgal.errors import ConfigError, SimulationError
-from proxcgal.models.capsule_robot import CapsuleRobot
+from proxcgal.core.errors import ConfigError, SimulationError
+from proxcgal.models.formats.capsule_robot import CapsuleRobot
 
 Array = NDArray[np.float64]
 

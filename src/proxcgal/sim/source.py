@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxcgal import _core
-from proxcgal.sim.errand import Errand
-from proxcgal.sim.mounting import RealMounts
-from proxcgal.sim.ranges import ZONES, RangeModel
-from proxcgal.sim.setup import Setup
-from proxcgal.sim.ticks import TickInput
+from proxcgal.scenario.setup import Setup
+from proxcgal.sim.mount_faults import RealMounts
+from proxcgal.sim.range_sensor import ZONES, RangeModel
+from proxcgal.sim.tick import TickInput
+from proxcgal.sim.waypoints import Errand
 from proxcgal.sim.world import Hits, World
 
 Array = NDArray[np.float64]

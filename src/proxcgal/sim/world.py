@@ -21,9 +21,9 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from proxcgal.errors import SimulationError
-from proxcgal.sim.solids import Box, Capsule, Cylinder, Solid, Sphere
-from proxcgal.sim.surfaces import Surfaces
+from proxcgal.core.errors import SimulationError
+from proxcgal.models.surfaces import Surfaces
+from proxcgal.scene.solids import Box, Capsule, Cylinder, Solid, Sphere
 
 
 def _off_screen_library() -> str:
@@ -45,7 +45,7 @@ import mujoco  # noqa: E402
 
 if TYPE_CHECKING:
     from proxcgal.models.robots import Robot
-    from proxcgal.sim.scene import Scene
+    from proxcgal.scene.obstacles import Scene
 
 Array = NDArray[np.float64]
 

@@ -1,1 +1,1 @@
-"""Many trials: workers, numbers and figures."""
+"""Campaigns of many trials: workers, tables, statistics, figures."""

@@ -14,13 +14,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from proxcgal.errors import ConfigError, ProxError
+from proxcgal.core.errors import ConfigError, ProxError
 from proxcgal.study.jobs import Report, StoppedError
-from proxcgal.study.pool import Pool
 from proxcgal.study.store import Cell, Outcome, Row, Store
+from proxcgal.study.workers import Pool
 
 if TYPE_CHECKING:
-    from proxcgal.sim.scenario import Scenario
+    from proxcgal.scenario.loading import Scenario
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

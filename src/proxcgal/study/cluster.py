@@ -8,8 +8,8 @@ from concurrent.futures import Executor
 from importlib import import_module
 from typing import Any
 
-from proxcgal.errors import ConfigError
-from proxcgal.sim.versions import versions
+from proxcgal.core.errors import ConfigError
+from proxcgal.core.versions import versions
 
 CONNECT_S = 10.0  # [s] in which a scheduler has to answer
 

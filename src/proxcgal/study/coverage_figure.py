@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from proxcgal.sim.blind import REACH_M, BlindVolume, distances, last_seen
-from proxcgal.sim.frames import placed
+from proxcgal.core.transforms import placed
+from proxcgal.evaluation.blind_volume import REACH_M, BlindVolume, distances, last_seen
 from proxcgal.study.figures import DPI, GREY, LEGEND
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from proxcgal.sim.setup import Setup
+    from proxcgal.scenario.setup import Setup
 
 Array = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from proxcgal.study.analysis import Summary, aligned
+from proxcgal.evaluation.metrics import Summary, aligned
 from proxcgal.study.campaign import Campaign, Trial
 
 if TYPE_CHECKING:

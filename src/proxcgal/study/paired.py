@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from proxcgal.study.analysis import NOTHING_M
+from proxcgal.evaluation.metrics import NOTHING_M
 
 Ends = Mapping[str, Mapping[int, float]]
 

@@ -11,9 +11,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from proxcgal.closing import Closing
-from proxcgal.errors import ConfigError
-from proxcgal.study.analysis import write_json
+from proxcgal.core.closing import Closing
+from proxcgal.core.errors import ConfigError
+from proxcgal.evaluation.metrics import write_json
 
 MANIFEST, TRIALS, SUMMARY = "campaign.json", "trials", "summary.json"
 

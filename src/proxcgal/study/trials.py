@@ -8,16 +8,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from proxcgal.errors import ConfigError, ModelWarning
-from proxcgal.sim.recorder import RecordedTicks, Recorder
-from proxcgal.sim.setup import make_robot
-from proxcgal.sim.trial import run_trial
+from proxcgal.core.errors import ConfigError, ModelWarning
+from proxcgal.recording.writer import RecordedTicks, Recorder
+from proxcgal.scenario.setup import make_robot
+from proxcgal.trial.trial import run_trial
 
 if TYPE_CHECKING:
     from proxcgal.models import Robot
-    from proxcgal.sim.scenario import Scenario
-    from proxcgal.sim.trial import TrialLog
+    from proxcgal.scenario.loading import Scenario
     from proxcgal.study.jobs import Report
+    from proxcgal.trial.trial import TrialLog
 
 _KEPT = 4  # robots, with all that is made of them once
 _robots: dict[Any, Robot] = {}

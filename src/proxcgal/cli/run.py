@@ -1,0 +1,184 @@
+"""`proxcgal run`: simulate a scene with one or several controllers."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from proxcgal.cli.options import (
+    ControllerName,
+    Flag,
+    Folders,
+    Number,
+    Settings,
+    checked_workers,
+    flat,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from proxcgal.evaluation.metrics import Summary
+    from proxcgal.scenario.loading import Scenario
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """Simulate a scene with one or several controllers, and write what happened.
+
+    Writes summary.json, scenario.toml (the resolved scenario), figures, a moving picture, one
+    recording per controller and report.html to DIR.
+
+    Examples:
+      proxcgal run front_plane
+      proxcgal run side_plane --controller wb sm --seed 3 --out out/side
+      proxcgal run front_plane --set controller.d_min=0.25 simulation.dropout=0.1
+      proxcgal run walkthrough_overspeed
+      proxcgal run joint_gate --set controller.off='["minimum_altitude"]'
+      proxcgal run hri_task1 --subject 7 --controller wb sm
+      proxcgal run my_scene.toml --robot my_arm.urdf --package-dir ~/robots
+    """
+
+    scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO")]
+    """A name that `proxcgal scenarios` lists, or a path to a TOML file."""
+    controller: Annotated[
+        tuple[ControllerName, ...] | None,
+        tyro.conf.arg(metavar="wb|sm|wb_known|wb_memory ...", help_behavior_hint=""),
+    ] = None
+    """wb: the whole body avoids. sm: only the sensors' mounting points do, the baseline.
+    wb_known: wb on points of the scene itself, the ceiling. wb_memory: wb that remembers what left
+    the sensors' view. Left out: wb sm wb_known; of a scene of kind `joint` wb_known, or wb where
+    its perception is sensed."""
+    robot: Annotated[str | None, tyro.conf.arg(metavar="NAME|PATH", help_behavior_hint="")] = None
+    """A name that `proxcgal robots` lists, or a .urdf or .xml file, instead of the scenario's."""
+    subject: Number = None
+    """Which virtual subject works there, any number from 1: stature, arms, speeds, reactions and
+    stance are drawn from it and operator.draw. Of scenarios with an operator."""
+    package_dir: Folders = ()
+    """Where package:// paths of the robot's file are looked up."""
+    seed: Number = None
+    """Fixes every random draw; instead of the scenario's."""
+    set: Settings = ()
+    """Change keys of the scenario, values as in TOML: controller.d_min=0.25"""
+    out: Annotated[
+        Path | None, tyro.conf.arg(metavar="DIR", help_behavior_hint="(default: out/SCENARIO)")
+    ] = None
+    """Where results go; an earlier run's files there are replaced."""
+    workers: Number = None
+    """Processes that simulate; left out: one a processor."""
+    no_picture: Flag = False
+    """Leave the moving picture out; runs of kind `joint` draw none."""
+    quiet: Flag = False
+    """No progress on stderr."""
+
+
+def run_command(options: RunOptions, command: str) -> int:
+    """Runs the trials; prints the table and the report's path."""
+    from proxcgal.core.errors import ConfigError
+    from proxcgal.core.provenance import origin
+    from proxcgal.report.report import write_report
+    from proxcgal.scenario.joint import JointScenario
+    from proxcgal.scenario.loading import HriScenario, load_scenario
+    from proxcgal.study.runs.joint import run_joint
+    from proxcgal.study.runs.results import Plan, check, perform
+
+    if options.controller == ():
+        raise ConfigError(
+            "--controller: none given, at least one of wb, sm, wb_known, wb_memory is needed"
+        )
+    workers = checked_workers(options.workers)
+    for name, number, least in (("--seed", options.seed, 0), ("--subject", options.subject, 1)):
+        if number is not None and not least <= number < 2**63:
+            raise ConfigError(f"{name} {number}: must be {least} to {2**63 - 1}")
+    if options.subject is not None:
+        base = load_scenario(options.scenario, flat(options.set))
+        if not isinstance(base, HriScenario):
+            raise ConfigError(
+                f'--subject {options.subject}: {options.scenario} has kind = "{base.kind}" and no '
+                'operator; scenarios of kind = "hri" have one'
+            )
+        if base.operator.recording is not None:
+            raise ConfigError(
+                f"--subject {options.subject}: operator.recording = {base.operator.recording}: its "
+                "person is always the same; leave one of the two out"
+            )
+    scenario = load_scenario(options.scenario, overrides(options))
+    if scenario.kind == "walkthrough":
+        if options.controller:
+            raise ConfigError(
+                f"--controller {' '.join(options.controller)}: {options.scenario} has kind = "
+                '"walkthrough", where a hand guides the arm: no controllers to choose from'
+            )
+        return _run_walkthrough(scenario, options, command)
+    controllers = tuple(dict.fromkeys(options.controller or scenario.controllers()))
+    folder = options.out or Path("out") / scenario.name
+    if isinstance(scenario, JointScenario):
+        return run_joint(
+            scenario, controllers, folder, command, workers=workers, quiet=options.quiet
+        )
+    check(scenario, controllers, quiet=options.quiet)
+    plan = Plan(scenario=scenario, controllers=controllers, folder=folder)
+    summaries = perform(
+        [plan],
+        origin(command),
+        workers=workers,
+        pictures=not options.no_picture,
+        quiet=options.quiet,
+    )
+    return conclude(summaries, write_report(plan.folder))
+
+
+def _run_walkthrough(scenario: Scenario, options: RunOptions, command: str) -> int:
+    """A walk-through has no controllers to choose from, and one process does it."""
+    from proxcgal.core.provenance import origin
+    from proxcgal.scenario.walkthrough import WalkScenario
+    from proxcgal.study.runs.walkthrough import run_walkthrough
+
+    assert isinstance(scenario, WalkScenario)
+    folder = options.out or Path("out") / scenario.name
+    return run_walkthrough(scenario, folder, origin(command), quiet=options.quiet)
+
+
+def overrides(options: RunOptions) -> list[str]:
+    """Assignments of all options that change the scenario; --set comes last and wins."""
+    from proxcgal.models.formats.paths import is_robot_file
+
+    changes = []
+    if options.robot is not None:
+        path = Path(options.robot).expanduser()
+        is_file = is_robot_file(path)
+        changes.append("robot=" + json.dumps(str(path.absolute()) if is_file else options.robot))
+    given = flat(options.package_dir, "--package-dir")
+    folders = [str(path.expanduser().absolute()) for path in given]
+    if folders:
+        changes.append("package_dirs=" + json.dumps(folders))
+    if options.subject is not None:
+        changes.append(f"operator.subject={options.subject}")
+    if options.seed is not None:
+        changes.append(f"seed={options.seed}")
+    return changes + flat(options.set)
+
+
+def conclude(summaries: Sequence[Summary], report: Path) -> int:
+    """Prints the table, what failed, and last the report's path; the exit code."""
+    import sys
+
+    from proxcgal.evaluation.metrics import SELF_LIMIT_M, coverage_lines, table
+
+    print(table(summaries))
+    for summary in summaries:
+        for line in coverage_lines(summary["scenario"], summary["closest_points"]):
+            print(line)
+    failed = [s for s in summaries if s["failed"]]
+    for summary in failed:
+        print(
+            f"proxcgal: {summary['scenario']}: failed: the arm came within "
+            f"{summary['self_min_m']:.3f} m of itself, allowed is {SELF_LIMIT_M} m",
+            file=sys.stderr,
+        )
+    print(report)
+    return 1 if failed else 0

@@ -1,0 +1,1 @@
+"""Shared by all rooms: errors, types, transforms, files, provenance, progress."""

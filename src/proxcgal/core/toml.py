@@ -1,0 +1,147 @@
+"""TOML in and out: dotted overrides, and a writer for what the standard library only reads."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import tomllib
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from proxcgal.core.errors import ConfigError
+
+Table = dict[str, Any]
+
+_DEEPEST = 64  # levels of tables and arrays: at some hundreds, what reads them would end
+_TOO_DEEP = f"must not be nested more than {_DEEPEST} deep"
+_BARE = re.compile(r"[A-Za-z0-9_-]+")  # a key that needs no quotes
+
+
+def parse(text: str, origin: str) -> Table:
+    """The tables of a TOML text.
+
+    Raises:
+        ConfigError: it is not TOML; the message names `origin` and the line. It is nested too
+            deeply.
+    """
+    try:
+        return _loaded(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"{origin}: not TOML: {error}") from None
+    except RecursionError:
+        raise ConfigError(f"{origin}: {_TOO_DEEP}") from None
+
+
+def override(table: Table, assignment: str) -> str:
+    """Sets one key of nested tables from `key.sub=value`, in place.
+
+    The value has TOML syntax; what is not a TOML value is taken as a string, so that
+    `robot=panda` needs no quotes. A number steps into an array: `obstacle.0.size=[1, 1, 1]`.
+
+    Returns:
+        The dotted key that was set, without spaces.
+
+    Raises:
+        ConfigError: no `=`, an empty key, more than a value, nested too deeply, or a step into what
+            is no table or array.
+    """
+    key, equals, text = assignment.partition("=")
+    steps = [step.strip() for step in key.split(".")]
+    if not equals or not all(steps):
+        raise ConfigError(f"override {assignment!r}: must have the form key.sub=value")
+    if len(steps) > _DEEPEST:
+        raise ConfigError(f"override {assignment!r}: {_TOO_DEEP}")
+    try:
+        value, *more = _loaded(f"value = {text}").values()
+    except tomllib.TOMLDecodeError:
+        value, more = text.strip(), []
+    except RecursionError:
+        raise ConfigError(f"override {assignment!r}: {_TOO_DEEP}") from None
+    if more:
+        raise ConfigError(f"override {assignment!r}: must have one value, and no lines after it")
+    place: Any = table
+    for depth, step in enumerate(steps):
+        last = depth == len(steps) - 1
+        if isinstance(place, list):
+            if not (step.isdecimal() and int(step) < len(place)):
+                raise ConfigError(
+                    f"override {assignment!r}: {'.'.join(steps[:depth])} has the entries "
+                    f"0 to {len(place) - 1}, not {step}"
+                )
+            steps[depth] = str(int(step))
+            if last:
+                place[int(step)] = value
+            else:
+                place = place[int(step)]
+        elif isinstance(place, dict):
+            if last:
+                place[step] = value
+            else:
+                place = place.setdefault(step, {})
+        else:
+            raise ConfigError(f"override {assignment!r}: {'.'.join(steps[:depth])} is no table")
+    return ".".join(steps)
+
+
+def _loaded(text: str) -> Table:
+    """Raises: RecursionError: deeper than `_DEEPEST`, by brackets or by dotted keys."""
+    table = tomllib.loads(text)
+    level: list[Any] = [table]
+    for _ in range(_DEEPEST + 1):
+        level = [item for place in level for item in _inside(place)]
+        if not level:
+            return table
+    raise RecursionError
+
+
+def _inside(place: Any) -> Iterable[Any]:
+    if isinstance(place, dict):
+        return place.values()
+    return place if isinstance(place, list) else ()
+
+
+def format_value(value: object) -> str:
+    """One TOML value, numbers at full precision."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        if math.isnan(value):
+            return "nan"
+        return repr(value) if math.isfinite(value) else ("inf" if value > 0 else "-inf")
+    if isinstance(value, str):
+        return _quoted(value)
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(format_value(item) for item in value) + "]"
+    if isinstance(value, Mapping):
+        pairs = ", ".join(f"{_key(key)} = {format_value(item)}" for key, item in value.items())
+        return "{" + pairs + "}"
+    return str(value)
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _key(name: str) -> str:
+    return name if _BARE.fullmatch(name) else _quoted(name)
+
+
+def _is_tables(value: object) -> bool:
+    return isinstance(value, list | tuple) and bool(value) and isinstance(value[0], Mapping)
+
+
+def write(table: Mapping[str, Any], path: str = "") -> str:
+    """TOML text of nested tables; keys that are None are left out, `path` is as written."""
+    plain, nested = [], []
+    for key, value in table.items():
+        if value is None:
+            continue
+        name = f"{path}.{_key(key)}" if path else _key(key)
+        if isinstance(value, Mapping):
+            nested.append(f"\n[{name}]\n" + write(value, name))
+        elif _is_tables(value):
+            nested.extend(f"\n[[{name}]]\n" + write(item, name) for item in value)
+        else:
+            plain.append(f"{_key(key)} = {format_value(value)}\n")
+    return "".join(plain) + "".join(nested)

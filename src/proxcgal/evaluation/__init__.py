@@ -1,0 +1,1 @@
+"""What happened in a run: ground truth, visibility, termination, metrics."""

@@ -1,0 +1,89 @@
+"""When a run is over: the goal reached, or no progress towards it for too long."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxcgal.scenario.joint import Finish
+
+Array = NDArray[np.float64]
+
+Outcome = Literal["succeeded", "aborted", "cancelled"]
+
+
+@dataclass(frozen=True, slots=True)
+class Holding:
+    """What keeps the arm from its goal."""
+
+    task: str = ""  #: "" where no single task does
+    link: str = ""  #: that the task moves; a joint for joint limits
+    obstacle: str = ""  #: the nearest one's name, or the other link
+    sensor: int = -1  #: that saw it, where one did
+    zone: int = -1
+    freed: float = 0.0  #: [m/s] or [rad/s] towards the goal that leaving the task out would give
+
+    def __str__(self) -> str:
+        """In words."""
+        words = {
+            "avoidance": "held off by the obstacle",
+            "self_collision": "held off by the robot itself",
+            "joint_limits": "held by a joint limit",
+            "minimum_altitude": "held up by the minimum altitude",
+        }
+        if not self.task:
+            return "no single task holds it"
+        told = words.get(self.task, f"held by {self.task}")
+        parts = [part for part in (self.link, self.obstacle) if part]
+        if self.sensor >= 0:
+            parts.append(f"sensor {self.sensor}, zone {self.zone}")
+        return told + (f" ({', '.join(parts)})" if parts else "")
+
+
+@dataclass(frozen=True, slots=True)
+class Ending:
+    """How a run ended."""
+
+    outcome: Outcome
+    reason: str
+    holding: Holding | None = None
+
+
+class GoalWatch:
+    """Is the goal reached, or has nothing come nearer to it for a while?"""
+
+    def __init__(self, finish: Finish, goal: Array) -> None:
+        """Args: `goal` is T_WT (4, 4)."""
+        self._finish = finish
+        self._goal = goal
+        self._least = [np.inf, np.inf]  # [m], [rad] that counted as progress last
+        self._since = 0.0
+
+    def errors(self, T_WT: Array) -> tuple[float, float]:
+        """Distance [m] and angle [rad] from the tool to the goal."""
+        return pose_errors(T_WT, self._goal)
+
+    def __call__(self, time: float, T_WT: Array) -> Ending | None:
+        """How the run ends here, or None: it goes on.
+
+        Progress is a least error so far, in position or in angle, that fell by a set amount.
+        """
+        errors, finish = self.errors(T_WT), self._finish
+        if errors[0] <= finish.position and errors[1] <= finish.angle:
+            return Ending("succeeded", "the goal is reached")
+        for row, error in enumerate(errors):
+            if error <= self._least[row] - finish.progress:
+                self._least[row], self._since = error, time
+        if time - self._since > finish.patience:
+            return Ending("aborted", f"no progress for {finish.patience:g} s")
+        return None
+
+
+def pose_errors(T_WT: Array, goal: Array) -> tuple[float, float]:
+    """Distance [m] and angle [rad] between two poses; accurate near 0 too."""
+    chord = np.linalg.norm(goal[:3, :3] - T_WT[:3, :3]) / np.sqrt(8.0)
+    angle = 2.0 * np.arcsin(min(float(chord), 1.0))
+    return float(np.linalg.norm(goal[:3, 3] - T_WT[:3, 3])), float(angle)

@@ -1,0 +1,1 @@
+"""Readers of robot descriptions: URDF, xacro, MJCF, capsule robots."""

@@ -1,0 +1,80 @@
+"""XML from files that may be broken or hostile: refused early, never expanded, never recursed."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Collection
+from pathlib import Path
+from typing import NoReturn
+from xml.parsers import expat
+
+from proxcgal.core.errors import ModelError
+
+MAX_BYTES = 64 * 2**20
+MAX_DEPTH = 256  # nested tags; a chain of bodies in an MJCF nests one per joint
+MAX_ELEMENTS = 100_000
+_CHUNK = 2**16
+
+
+def parse_xml(path: Path, roots: Collection[str]) -> ET.Element:
+    """Read an XML file as a tree.
+
+    Args:
+        path: the file.
+        roots: what the outermost tag may be; empty for any.
+
+    Raises:
+        ModelError: it cannot be read, is not well-formed, declares a document type or an entity,
+            or goes past the bounds on size, depth and number of elements.
+    """
+    if (size := _size(path)) > MAX_BYTES:
+        raise ModelError(f"{path}: {size} bytes; at most {MAX_BYTES} are read")
+    builder = ET.TreeBuilder()
+    parser = expat.ParserCreate()
+    depth = count = 0
+
+    def refuse(what: str) -> NoReturn:
+        raise ModelError(f"{path}, line {parser.CurrentLineNumber}: {what}")
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal depth, count
+        depth += 1
+        count += 1
+        if depth > MAX_DEPTH:
+            refuse(f"tags nested deeper than {MAX_DEPTH}")
+        if count > MAX_ELEMENTS:
+            refuse(f"more than {MAX_ELEMENTS} elements")
+        if count == 1 and roots and tag not in roots:
+            refuse(f"the outermost tag is <{tag}>; expected <{'> or <'.join(sorted(roots))}>")
+        builder.start(tag, attributes)
+
+    def end(tag: str) -> None:
+        nonlocal depth
+        depth -= 1
+        builder.end(tag)
+
+    def doctype(*_: object) -> None:
+        refuse("a document type declaration, which can define entities; none is allowed")
+
+    parser.StartElementHandler = start
+    parser.EndElementHandler = end
+    parser.CharacterDataHandler = builder.data
+    parser.StartDoctypeDeclHandler = doctype
+    parser.EntityDeclHandler = doctype
+    try:
+        with path.open("rb") as file:
+            while chunk := file.read(_CHUNK):
+                parser.Parse(chunk, False)
+            parser.Parse(b"", True)
+    except expat.ExpatError as error:
+        raise ModelError(f"{path}: not well-formed XML: {error}") from None
+    except OSError as error:
+        raise ModelError(f"{path}: cannot be read: {error.strerror}") from None
+    return builder.close()
+
+
+def _size(path: Path) -> int:
+    try:
+        return path.stat().st_size
+    except OSError as error:
+        raise ModelError(f"{path}: cannot be read: {error.strerror}") from None

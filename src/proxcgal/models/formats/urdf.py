@@ -1,0 +1,241 @@
+"""URDF (and xacro) to a robot description.
+
+The structure is checked before pinocchio sees it, which takes a link with two parents, or a cycle,
+and returns a shorter robot. What pinocchio gets holds links and joints only.
+"""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from proxcgal.core.errors import GeometryError, ModelError
+from proxcgal.models.description import listed
+from proxcgal.models.formats.common import Shape, is_direction, number, numbers, transform
+from proxcgal.models.formats.paths import MeshFolders
+from proxcgal.models.mesh.files import box, cylinder, ellipsoid
+from proxcgal.models.mesh.triangles import Floats, Ints
+
+MAX_LINKS = 1000
+_AXIS = "1 0 0"  # where none is given
+_MOVING = {"revolute", "continuous", "prismatic"}
+_REFUSED = {
+    "floating": "moves freely",
+    "planar": "moves in a plane",
+    "ball": "turns about three axes",
+}
+
+
+def check_structure(root: ET.Element, path: Path) -> None:
+    """See that the links form one tree and every joint says all that is needed.
+
+    Raises:
+        ModelError: names the links and joints concerned.
+    """
+    links = [_name(e, "link", path) for e in root.findall("link")]
+    joints = {}
+    for element in root.findall("joint"):
+        name = _name(element, "joint", path)
+        if name in joints:
+            raise ModelError(f"{path}: two joints are called '{name}'")
+        joints[name] = element
+    if max(len(links), len(joints)) > MAX_LINKS:
+        raise ModelError(
+            f"{path}: {len(links)} links, {len(joints)} joints; at most {MAX_LINKS} are read"
+        )
+    if twice := [name for name, count in Counter(links).items() if count > 1]:
+        raise ModelError(f"{path}: more than one link is called {listed(twice)}")
+    if not links:
+        raise ModelError(f"{path}: no links")
+    known = set(links)
+    parent_of: dict[str, tuple[str, str]] = {}  # child link -> (joint, parent link)
+    for name, element in joints.items():
+        parent, child = (_link_of(element, end, name, path) for end in ("parent", "child"))
+        for link in (parent, child):
+            if link not in known:
+                raise ModelError(
+                    f"{path}: joint '{name}' names link '{link}', which does not exist; there are "
+                    f"{listed(links)}"
+                )
+        if child in parent_of:
+            other, first = parent_of[child]
+            raise ModelError(
+                f"{path}: link '{child}' has two parents: '{first}' by joint '{other}' and "
+                f"'{parent}' by joint '{name}'"
+            )
+        parent_of[child] = (name, parent)
+        _check_joint(element, name, path)
+    _check_tree(links, parent_of, path)
+
+
+def _check_tree(links: Sequence[str], parent_of: dict[str, tuple[str, str]], path: Path) -> None:
+    for link in links:
+        chain = [link]
+        while chain[-1] in parent_of:
+            chain.append(parent_of[chain[-1]][1])
+            if chain[-1] == link:
+                loop = [parent_of[name][0] for name in chain[:-1]]
+                raise ModelError(
+                    f"{path}: links {listed(chain[:-1])} form a cycle (joints {listed(loop)})"
+                )
+            if len(chain) > len(links):
+                break  # runs into a cycle of others, found at one of those
+    roots = [link for link in links if link not in parent_of]
+    if len(roots) != 1:
+        raise ModelError(
+            f"{path}: links {listed(roots)} have no parent; exactly one link, the base, may"
+        )
+
+
+def _check_joint(element: ET.Element, name: str, path: Path) -> None:
+    kind = element.get("type", "")
+    what = f"{path}: joint '{name}'"
+    if kind in _REFUSED:
+        raise ModelError(
+            f"{what} is {kind} ({_REFUSED[kind]}); revolute, continuous, prismatic and fixed "
+            "joints are read"
+        )
+    if kind not in _MOVING | {"fixed"}:
+        raise ModelError(
+            f"{what} has type '{kind}'; revolute, continuous, prismatic and fixed are read"
+        )
+    _origin(element, what)
+    if kind == "fixed":
+        return
+    if (mimic := element.find("mimic")) is not None:
+        raise ModelError(
+            f"{what} follows joint '{mimic.get('joint')}' (mimic); joints that follow others are "
+            "not read: make it fixed, or put the part on with attach_mesh"
+        )
+    if not is_direction(_axis(element, what)):
+        raise ModelError(f"{what} has axis 0 0 0; a direction is needed")
+    limit = element.find("limit")
+    if limit is None:
+        if kind != "continuous":
+            raise ModelError(f"{what} is {kind} and has no <limit>; lower and upper are needed")
+        return
+    for key in ("lower", "upper", "velocity"):
+        number(limit.get(key, "0"), f"{what}, limit {key}", math.inf)
+    lower, upper = (float(limit.get(key, "0")) for key in ("lower", "upper"))
+    if kind != "continuous" and not lower < upper:
+        raise ModelError(f"{what} has lower limit {lower} and upper limit {upper}; lower < upper")
+
+
+def kinematics_only(root: ET.Element) -> str:
+    """The URDF with its links and joints, without meshes, inertias and extensions."""
+    out = ET.Element("robot", {"name": root.get("name") or "robot"})
+    for link in root.findall("link"):
+        ET.SubElement(out, "link", {"name": link.get("name", "")})
+    for joint in root.findall("joint"):
+        kept = ET.SubElement(out, "joint", dict(joint.attrib))
+        for tag in ("origin", "parent", "child", "axis"):
+            if (part := joint.find(tag)) is not None:
+                ET.SubElement(kept, tag, dict(part.attrib))
+                if tag == "axis":  # without numbers it is the default, not 0 0 0
+                    kept[-1].set("xyz", part.get("xyz", _AXIS))
+        if joint.get("type") != "fixed":
+            limit = joint.find("limit")
+            given = {} if limit is None else limit.attrib
+            # Speed and effort are not taken from pinocchio, whose parser would complain by itself.
+            values = {"velocity": "0", "effort": "0"}
+            values |= {key: value for key, value in given.items() if key in ("lower", "upper")}
+            ET.SubElement(kept, "limit", values)
+    return ET.tostring(out, encoding="unicode")
+
+
+def speed_limits(root: ET.Element) -> dict[str, float]:
+    """Speed limit of each joint that has one [rad/s or m/s]; 0 counts as none."""
+    found = {}
+    for joint in root.findall("joint"):
+        limit = joint.find("limit")
+        if limit is not None and float(limit.get("velocity", "0")) > 0:
+            found[joint.get("name", "")] = float(limit.get("velocity", "0"))
+    return found
+
+
+def shapes(root: ET.Element, folders: MeshFolders) -> dict[str, list[Shape]]:
+    """What each link looks like: its visuals, or its collision shapes where it has no visual.
+
+    Raises:
+        ModelError: a mesh file that is missing or outside of its folders, a shape that is not read.
+    """
+    found = {}
+    for link in root.findall("link"):
+        name = link.get("name", "")
+        for tag in ("visual", "collision"):
+            parts = [part for e in link.findall(tag) if (part := _shape(e, name, folders))]
+            if parts:
+                found[name] = parts
+                break
+    return found
+
+
+def _shape(element: ET.Element, link: str, folders: MeshFolders) -> Shape | None:
+    what = f"link '{link}'"
+    where = f"{folders.description}: {what}"
+    geometry = element.find("geometry")
+    if geometry is None or not len(geometry):
+        return None
+    kind = geometry[0]
+    pose = _origin(element, where)
+    if kind.tag == "mesh":
+        scale = numbers(kind.get("scale", "1 1 1"), 3, f"{where}, mesh scale")
+        if (scale == 0).any():
+            raise ModelError(f"{where} has mesh scale {scale.tolist()}; 0 leaves no surface")
+        return Shape(pose, file=folders.find(kind.get("filename", ""), what), scale=scale)
+    made: tuple[Floats, Ints]
+    if kind.tag == "box":
+        made = box(_positive(numbers(kind.get("size", ""), 3, f"{where}, box size"), where))
+    elif kind.tag == "cylinder":
+        sizes = [number(kind.get(key, ""), f"{where}, cylinder {key}") for key in
+                 ("radius", "length")]  # fmt: skip
+        radius, length = _positive(np.array(sizes), where)
+        made = cylinder(radius, length)
+    elif kind.tag == "sphere":
+        radius = number(kind.get("radius", ""), f"{where}, sphere radius")
+        made = ellipsoid(_positive(np.full(3, radius), where))
+    else:
+        raise ModelError(f"{where} has shape <{kind.tag}>; mesh, box, cylinder, sphere are read")
+    return Shape(pose, mesh=made)
+
+
+def _positive(sizes: Floats, where: str) -> Floats:
+    if not (sizes > 0).all():
+        raise GeometryError(
+            f"{where} has a shape with size {sizes.tolist()}; more than 0 is needed"
+        )
+    return sizes
+
+
+def _origin(element: ET.Element, what: str) -> Floats:
+    """T (4, 4) of an <origin>."""
+    origin = element.find("origin")
+    if origin is None:
+        return np.eye(4)
+    return transform(
+        numbers(origin.get("xyz", "0 0 0"), 3, f"{what}, origin xyz"),
+        numbers(origin.get("rpy", "0 0 0"), 3, f"{what}, origin rpy"),
+    )
+
+
+def _axis(element: ET.Element, what: str) -> Floats:
+    axis = element.find("axis")
+    return numbers(_AXIS if axis is None else axis.get("xyz", _AXIS), 3, f"{what}, axis")
+
+
+def _name(element: ET.Element, tag: str, path: Path) -> str:
+    if not (name := element.get("name", "")):
+        raise ModelError(f"{path}: a <{tag}> without a name")
+    return name
+
+
+def _link_of(element: ET.Element, end: str, joint: str, path: Path) -> str:
+    part = element.find(end)
+    if part is None or not part.get("link"):
+        raise ModelError(f"{path}: joint '{joint}' has no <{end} link=...>")
+    return part.get("link", "")

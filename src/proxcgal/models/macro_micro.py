@@ -1,0 +1,123 @@
+"""Two arms of one chain: the macro arm carries the micro arm, and what each does."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxcgal import _core
+from proxcgal.core.cache import Cache, Stored
+from proxcgal.core.errors import ConfigError
+from proxcgal.models.surfaces import Surfaces
+
+if TYPE_CHECKING:
+    from proxcgal.models.robots import Robot
+
+Array = NDArray[np.float64]
+
+_POSTURES = 4000
+_SAMPLES, _FEW_JOINTS = 1000, 3
+_largest: WeakKeyDictionary[Robot, dict[tuple[int, int], float]] = WeakKeyDictionary()
+
+
+def part(robot: Robot, macro_joints: int, arm: str) -> tuple[int, int]:
+    """First joint and number of joints of the `macro` or the `micro` arm.
+
+    Raises:
+        ConfigError: the robot has no two such arms.
+    """
+    if not 0 < macro_joints < robot.n_q:
+        raise ConfigError(
+            f"controller.macro_joints = {macro_joints}: {robot.name} has {robot.n_q} joints, so "
+            f"between 1 and {robot.n_q - 1} are those of the arm that carries the other"
+        )
+    return (0, macro_joints) if arm == "macro" else (macro_joints, robot.n_q - macro_joints)
+
+
+def watched_pairs(robot: Robot, macro_joints: int, d_min: float) -> list[tuple[str, str]]:
+    """Links that self-collision watches, two and two.
+
+    Those that are neither neighbours nor near in every posture, one at least beyond the macro arm;
+    where there is no macro arm, all of them. Left out are links with at most three joints between
+    them that come no nearer than `d_min` [m] in any of 1000 random postures: such as turn about one
+    axis.
+    """
+    names, joints = robot.link_names, robot.joint_names[macro_joints:]
+
+    def carried(link: int) -> bool:
+        return any(robot.moves(joint, names[link]) for joint in joints)
+
+    def between(a: int, b: int) -> int:
+        return sum(robot.moves(j, names[a]) != robot.moves(j, names[b]) for j in robot.joint_names)
+
+    pairs = [(a, b) for a, b in Surfaces.of(robot).self_pairs.tolist() if carried(a) or carried(b)]
+    apart = _never_near(robot, [pair for pair in pairs if between(*pair) <= _FEW_JOINTS], d_min)
+    return [(names[a], names[b]) for a, b in pairs if (a, b) not in apart]
+
+
+def _never_near(robot: Robot, pairs: list[tuple[int, int]], d_min: float) -> set[tuple[int, int]]:
+    """Those of the pairs that no random posture brings nearer than `d_min` [m]; kept in a cache."""
+    kept = Cache("never_near")
+    key = [_SAMPLES, d_min, pairs, robot.digest]
+    entry = kept.get(key)
+    if entry is None:
+        generator = np.random.default_rng(0)
+        reach = np.maximum(robot.q_min, -np.pi), np.minimum(robot.q_max, np.pi)
+        left = list(pairs)
+        for q in generator.uniform(*reach, (_SAMPLES, robot.n_q)):
+            near = np.asarray(_core.self_distances(robot, q, left, d_min)) < d_min
+            left = [pair for pair, is_near in zip(left, near, strict=True) if not is_near]
+        entry = Stored({"pairs": np.array(left, np.int64).reshape(-1, 2)}, {})
+        kept.put(key, entry)
+    return {(int(a), int(b)) for a, b in entry.arrays["pairs"]}
+
+
+def tool_jacobian(robot: Robot, q: Array) -> Array:
+    """(6, n_q) at the tool, linear rows first, in world."""
+    tool_W = np.asarray(robot.tool_pose(q))[:3, 3]
+    return np.asarray(robot.jacobian(q, tool_link(robot), tool_W))
+
+
+def tool_link(robot: Robot) -> str:
+    """The last link that moves with the tool."""
+    joint = robot.description.tool_frame.joint
+    return next(link.name for link in reversed(robot.description.links) if link.joint == joint)
+
+
+def manipulability(J: Array, first: int, joints: int) -> float:
+    """sqrt(det(J J')) of an arm's columns of the tool's Jacobian."""
+    own = J[:, first : first + joints]
+    return float(np.prod(np.linalg.svd(own, compute_uv=False)))
+
+
+def largest_manipulability(robot: Robot, first: int, joints: int) -> float:
+    """Of 4000 random postures of the whole robot, the same ones for the same robot."""
+    known = _largest.setdefault(robot, {})
+    if (first, joints) not in known:
+        generator = np.random.default_rng(0)
+        reach = np.maximum(robot.q_min, -np.pi), np.minimum(robot.q_max, np.pi)
+        postures = generator.uniform(*reach, (_POSTURES, robot.n_q))
+        known[first, joints] = max(
+            manipulability(tool_jacobian(robot, q), first, joints) for q in postures
+        )
+    return known[first, joints]
+
+
+def speeds(robot: Robot, macro_joints: int, q: Array, qd: Array) -> Array:
+    """(n, 2) how fast the macro and the micro arm each move the tool, |J_arm qd_arm| [m/s].
+
+    Args:
+        robot: of both arms.
+        macro_joints: so many first joints are those of the macro arm.
+        q: (n, n_q) postures.
+        qd: (n, n_q) velocities there.
+    """
+    out = np.zeros((len(q), 2))
+    for row, (posture, velocity) in enumerate(zip(q, qd, strict=True)):
+        J = tool_jacobian(robot, posture)[:3]
+        out[row, 0] = np.linalg.norm(J[:, :macro_joints] @ velocity[:macro_joints])
+        out[row, 1] = np.linalg.norm(J[:, macro_joints:] @ velocity[macro_joints:])
+    return out

@@ -1,0 +1,1 @@
+"""Triangle meshes: files, resolution, and what is drawn."""

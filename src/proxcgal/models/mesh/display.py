@@ -1,0 +1,44 @@
+"""Meshes that are looked at: about a thousand vertices a link, made once and kept."""
+
+from __future__ import annotations
+
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from proxcgal.models.mesh.resolution import COUNT_TOLERANCE, control_mesh
+from proxcgal.models.mesh.triangles import Floats, Ints
+from proxcgal.models.robots import Robot
+
+#: Of a link's mesh on a page: those of the controller's usual mesh, which is there already.
+DISPLAY_VERTICES = 1000
+_DEVIATION = 0.002  # [m] as a robot's control meshes are made where nothing else is asked for
+
+
+def display_meshes(robot: Robot, vertices: int = DISPLAY_VERTICES) -> list[tuple[Floats, Ints]]:
+    """A light mesh of each link: vertices_L (v, 3) [m] and triangles (f, 3), from the cache.
+
+    Within 2 mm of the full one where so many vertices are enough for that; nothing is computed on
+    them.
+
+    Args:
+        robot: its links, in the order of link_names.
+        vertices: of a link, at most.
+    """
+    made = _made.setdefault(robot, {})
+    if vertices not in made:
+        made[vertices] = [_light(*robot.full_mesh(link), vertices) for link in robot.link_names]
+    return made[vertices]
+
+
+_made: WeakKeyDictionary[Robot, dict[int, list[tuple[Floats, Ints]]]] = WeakKeyDictionary()
+
+
+def _light(vertices_L: Floats, triangles: Ints, count: int) -> tuple[Floats, Ints]:
+    if len(vertices_L) <= count:
+        return vertices_L, triangles
+    most = (1.0 + COUNT_TOLERANCE) * count
+    made = control_mesh(vertices_L, triangles, count, _DEVIATION)
+    if len(made.vertices_L) > most:
+        made = control_mesh(vertices_L, triangles, count, np.inf)
+    return made.vertices_L, made.triangles

@@ -1,0 +1,236 @@
+"""Mesh files and simple shapes as clean triangles: welded, finite, without empty faces."""
+
+from __future__ import annotations
+
+import io
+import os
+from pathlib import Path
+
+import numpy as np
+
+from proxcgal.core.errors import GeometryError
+from proxcgal.models.formats.safe_xml import parse_xml
+from proxcgal.models.mesh.triangles import Floats, Ints, compact, double_areas
+
+MAX_FACES = 5_000_000
+MAX_MESH_BYTES = 512 * 2**20
+SUFFIXES = (".stl", ".obj", ".dae", ".ply", ".off")
+# Farther from the origin nothing is looked for, and squares would leave single precision [m].
+FARTHEST = 1e9
+# Vertices closer than this are one [m].
+_WELD = 1e-7
+# A face whose doubled area is below this share of its longest side squared has none.
+_NO_AREA = 1e-9
+# A round shape is drawn with this many corners: at radius 0.2 m its facets lie within 0.3 mm.
+_ROUND = 60
+
+
+def load_mesh(path: str | os.PathLike[str]) -> tuple[Floats, Ints]:
+    """Triangles of a mesh file, as they are in it.
+
+    Args:
+        path: STL, OBJ, DAE (its length unit is applied), PLY or OFF.
+
+    Returns:
+        vertices (v, 3) [m] and triangles (f, 3).
+
+    Raises:
+        GeometryError: not such a file, nothing in it, too large, a vertex that is not finite or an
+            index of no vertex. Names the file, and the face where one is to blame.
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise GeometryError(f"{path}: not a mesh file; {', '.join(SUFFIXES)} are read")
+    try:
+        size = path.stat().st_size
+        if size > MAX_MESH_BYTES:
+            raise GeometryError(f"{path}: {size} bytes; at most {MAX_MESH_BYTES} are read")
+        data = path.read_bytes()
+    except OSError as error:
+        raise GeometryError(f"{path}: cannot be read: {error.strerror}") from None
+    if suffix == ".obj":
+        vertices, triangles = _read_obj(data, path)
+    else:
+        vertices, triangles = _read_with_trimesh(data, path)
+    check_mesh(vertices, triangles, str(path))
+    return vertices, triangles
+
+
+def check_mesh(vertices: Floats, triangles: Ints, what: str) -> None:
+    """Refuse a mesh that no distance can be asked of.
+
+    Raises:
+        GeometryError: wrong shape, no face, too many faces, a vertex that is not finite, an index
+            of no vertex.
+    """
+    if vertices.ndim != 2 or vertices.shape[1] != 3 or triangles.ndim != 2:
+        raise GeometryError(
+            f"{what}: vertices {vertices.shape} and triangles {triangles.shape}; (v, 3) and (f, 3) "
+            "are needed"
+        )
+    if not len(triangles) or triangles.shape[1] != 3:
+        raise GeometryError(f"{what}: no triangles")
+    if len(triangles) > MAX_FACES:
+        raise GeometryError(f"{what}: {len(triangles)} faces; at most {MAX_FACES} are taken")
+    outside = (triangles < 0) | (triangles >= len(vertices))
+    if outside.any():
+        face, corner = np.argwhere(outside)[0]
+        raise GeometryError(
+            f"{what}: face {face} has vertex {triangles[face, corner]}; there are {len(vertices)}"
+        )
+    bad = ~np.isfinite(vertices).all(axis=1)
+    if bad.any():
+        row = int(np.argmax(bad))
+        face = np.nonzero((triangles == row).any(axis=1))[0]
+        where = f", used by face {face[0]}" if len(face) else ""
+        raise GeometryError(f"{what}: vertex {row} is {vertices[row].tolist()}{where}")
+
+
+def clean(vertices: Floats, triangles: Ints, what: str) -> tuple[Floats, Ints, int]:
+    """Join vertices that coincide and leave out faces without area.
+
+    Returns:
+        vertices (v, 3), triangles (f, 3) and how many faces were left out.
+
+    Raises:
+        GeometryError: no face has an area, a vertex is farther than 1e9 m from the origin.
+    """
+    if not (near := np.abs(vertices).max(axis=1) <= FARTHEST).all():
+        row = int(np.argmin(near))
+        raise GeometryError(
+            f"{what}: vertex {row} is {vertices[row].tolist()}; at most {FARTHEST:g} m from the "
+            "origin are taken"
+        )
+    cell = np.round(vertices / _WELD).astype(np.int64)
+    _, first, rows = np.unique(cell, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)  # as in the file
+    place = np.empty(len(order), dtype=np.int64)
+    place[order] = np.arange(len(order))
+    vertices = vertices[first[order]]
+    welded = place[rows.reshape(-1)][triangles]
+    corners = vertices[welded]
+    longest = ((corners - np.roll(corners, 1, axis=1)) ** 2).sum(axis=2).max(axis=1)
+    good = double_areas(vertices, welded) > _NO_AREA * np.maximum(longest, 1e-300)
+    if not good.any():
+        raise GeometryError(f"{what}: none of its {len(triangles)} faces has an area")
+    vertices, welded = compact(vertices, welded[good])
+    return np.ascontiguousarray(vertices, dtype=np.float64), welded, int(np.sum(~good))
+
+
+def _read_obj(data: bytes, path: Path) -> tuple[Floats, Ints]:
+    """Vertices and faces of an OBJ; what else it holds (materials, normals) is for pictures.
+
+    trimesh takes index 0 for the last vertex and drops what it cannot place, so it is not used.
+    """
+    vertices: list[list[bytes]] = []
+    faces: list[tuple[int, int, int]] = []
+    for number, line in enumerate(data.splitlines(), start=1):
+        if line.startswith(b"v "):
+            vertices.append(line.split()[1:4])
+        elif line.startswith(b"f "):
+            try:
+                corners = [int(token.split(b"/", 1)[0]) for token in line.split()[1:]]
+            except ValueError:
+                raise GeometryError(f"{path}, line {number}: not a face") from None
+            # From 1, or backwards from the latest vertex.
+            rows = [c - 1 if c > 0 else len(vertices) + c if c else -1 for c in corners]
+            if len(rows) < 3:
+                raise GeometryError(
+                    f"{path}, line {number}: a face with {len(rows)} corners; 3 are needed"
+                )
+            if outside := [c for c, row in zip(corners, rows, strict=True)
+                           if not 0 <= row < MAX_MESH_BYTES]:  # fmt: skip
+                raise GeometryError(
+                    f"{path}, line {number}: face {len(faces)} has vertex {outside[0]}; "
+                    f"{len(vertices)} are known there"
+                )
+            faces += [(rows[0], rows[k], rows[k + 1]) for k in range(1, len(rows) - 1)]
+            if len(faces) > MAX_FACES:
+                raise GeometryError(f"{path}: more than {MAX_FACES} faces")
+    try:
+        points = np.array(vertices, dtype=np.float64).reshape(-1, 3)
+    except ValueError:
+        raise GeometryError(f"{path}: a vertex is not three numbers") from None
+    return points, np.array(faces, dtype=np.int64).reshape(-1, 3)
+
+
+def _read_with_trimesh(data: bytes, path: Path) -> tuple[Floats, Ints]:
+    suffix = path.suffix.lower()
+    if suffix == ".stl" and data[:5].lower() != b"solid":
+        count = int.from_bytes(data[80:84], "little")
+        if count > MAX_FACES:
+            raise GeometryError(f"{path}: {count} faces; at most {MAX_FACES} are taken")
+        if len(data) < 84 + 50 * count:
+            raise GeometryError(f"{path}: cut off: {count} faces take {84 + 50 * count} bytes, "
+                                f"{len(data)} are there")  # fmt: skip
+    unit = 1.0
+    if suffix == ".dae":
+        # In metres per unit, which trimesh notes and does not apply. The up axis is left alone, as
+        # ROS and pinocchio do.
+        try:
+            asset = parse_xml(path, {"COLLADA"}).find("asset/unit")
+            unit = float(asset.get("meter", "1")) if asset is not None else 1.0
+        except ValueError as error:
+            raise GeometryError(str(error)) from None
+        if not 0 < unit <= FARTHEST:
+            raise GeometryError(f"{path}: its unit is {unit} m; more than 0 is needed, at most "
+                                f"{FARTHEST:g}")  # fmt: skip
+    import trimesh  # here, because a warm cache does without it
+
+    try:
+        # From memory: there is no folder from which it could read anything else.
+        scene = trimesh.load_scene(io.BytesIO(data), file_type=suffix[1:], process=False)
+        mesh = scene.to_mesh()
+    except Exception as error:  # whatever a broken file makes the readers raise
+        raise GeometryError(f"{path}: cannot be read as a mesh: {error!r}") from None
+    vertices = np.asarray(mesh.vertices, dtype=np.float64).reshape(-1, 3)
+    with np.errstate(over="ignore"):  # what overflows is refused as not finite
+        return vertices * unit, np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)
+
+
+def box(size: Floats) -> tuple[Floats, Ints]:
+    """A box of the given full size (3,) [m] round the origin."""
+    corner = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+    faces = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
+             [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]  # fmt: skip
+    return corner * size, np.array(faces)
+
+
+def cylinder(radius: float, length: float) -> tuple[Floats, Ints]:
+    """A closed cylinder along z round the origin [m]."""
+    return _turned([(0.0, -length / 2), (radius, -length / 2), (radius, length / 2),
+                    (0.0, length / 2)])  # fmt: skip
+
+
+def ellipsoid(radii: Floats) -> tuple[Floats, Ints]:
+    """An ellipsoid with semi-axes (3,) [m] round the origin; a sphere where they are equal."""
+    angle = np.linspace(-np.pi / 2, np.pi / 2, _ROUND // 2 + 1)
+    vertices, triangles = _turned(list(zip(np.cos(angle), np.sin(angle), strict=True)))
+    return vertices * radii, triangles
+
+
+def capsule(radius: float, length: float) -> tuple[Floats, Ints]:
+    """A capsule along z round the origin; `length` is that of its straight part [m]."""
+    low = np.linspace(-np.pi / 2, 0, _ROUND // 4 + 1)
+    profile = [(radius * np.cos(a), radius * np.sin(a) - length / 2) for a in low]
+    return _turned(profile + [(r, -z) for r, z in reversed(profile)])
+
+
+def _turned(profile: list[tuple[float, float]]) -> tuple[Floats, Ints]:
+    """A profile of (radius, z), from the axis to the axis, turned about z."""
+    angle = 2 * np.pi * np.arange(_ROUND) / _ROUND
+    rings = [np.stack([r * np.cos(angle), r * np.sin(angle), np.full(_ROUND, z)], axis=1)
+             for r, z in profile[1:-1]]  # fmt: skip
+    poles = np.array([[0.0, 0.0, profile[0][1]], [0.0, 0.0, profile[-1][1]]])
+    vertices = np.concatenate([*rings, poles])
+    here, after = np.arange(_ROUND), (np.arange(_ROUND) + 1) % _ROUND
+    south, north = len(vertices) - 2, len(vertices) - 1
+    faces = [np.stack([np.full(_ROUND, south), after, here], axis=1)]
+    for ring in range(len(rings) - 1):
+        low, high = ring * _ROUND, (ring + 1) * _ROUND
+        faces.append(np.stack([low + here, low + after, high + after], axis=1))
+        faces.append(np.stack([low + here, high + after, high + here], axis=1))
+    top = (len(rings) - 1) * _ROUND
+    faces.append(np.stack([np.full(_ROUND, north), top + here, top + after], axis=1))
+    return vertices, np.concatenate(faces)

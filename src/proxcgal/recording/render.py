@@ -1,0 +1,168 @@
+"""Pictures of a recorded run: the arm, what it senses, and the closest pair as an arrow."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from proxcgal.core.errors import ConfigError
+from proxcgal.core.transforms import inverse, placed
+from proxcgal.recording.reader import Recording
+from proxcgal.recording.replay import Replay
+from proxcgal.scenario.setup import Setup
+from proxcgal.sim.moment import without
+from proxcgal.sim.tick import Tick
+from proxcgal.sim.world import Arrow, Camera, Color, Spheres, World
+
+Array = NDArray[np.float64]
+Picture = NDArray[np.uint8]
+
+_FILTERED: Color = (0.80, 0.05, 0.10, 1.0)
+_RAW: Color = (0.25, 0.45, 0.95, 0.55)
+_PAIR: Color = (0.05, 0.60, 0.20, 1.0)
+_AXES: tuple[Color, ...] = ((0.9, 0.1, 0.1, 1.0), (0.1, 0.7, 0.1, 1.0), (0.1, 0.2, 0.9, 1.0))
+_GIF_COLORS = 128
+_ASIDE, _DOWN = -1.05, -0.38  # [rad] of the view against the obstacle's direction
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """What one tick looked like from inside the controller."""
+
+    tick: Tick
+    cloud_W: Array  #: (n, 3) filtered [m]
+    raw_W: Array  #: (n, 3) before body removal [m]
+    elapsed: float  #: [s] of the run
+    q: Array  #: (n_q,) where the arm was
+
+
+def snapshots(
+    recording: Recording, times: Sequence[float], controller: str | None = None
+) -> list[Snapshot]:
+    """What the controller held at each of these times.
+
+    Args:
+        recording: of a run.
+        times: [s] in ascending order; each takes the first tick at or after it, or the last.
+        controller: another one, given the same inputs: its pairs on the same postures.
+    """
+    if not recording.ticks:
+        raise ConfigError(f"recording {recording.path}: has no ticks to draw")
+    rows = np.searchsorted([tick.given.time for tick in recording.ticks], times)
+    wanted = np.minimum(rows, len(recording.ticks) - 1).tolist()
+    replay = Replay(recording, controller)
+    taken = {}
+    for row, (tick, q) in enumerate(zip(replay, recording.postures(), strict=True)):
+        if row in wanted:
+            elapsed = row * replay.law.config.period
+            taken[row] = Snapshot(tick, replay.law.cloud_W(), replay.law.raw_cloud_W(), elapsed, q)
+        if row >= max(wanted, default=-1):
+            break
+    return [taken[row] for row in wanted]
+
+
+def viewpoint(setup: Setup) -> Camera:
+    """From beside the arm, towards the face that the nearest obstacle turns to it."""
+    base_W = np.array([0.0, 0.0, 0.6])
+    tool_W = np.array(setup.robot.tool_pose(setup.q0))[:3, 3]
+    faces = [
+        placed(T_WO, solid.nearest(placed(inverse(T_WO), base_W)))
+        for solid, T_WO in zip(setup.scene.solids, setup.scene.poses(0.0), strict=True)
+    ]
+    face_W = min(faces, key=lambda point: float(np.linalg.norm(point - base_W)), default=tool_W)
+    across = np.arctan2(face_W[1], face_W[0])
+    middle = (base_W + tool_W + face_W) / 3.0
+    return Camera(tuple(middle.tolist()), 2.4, float(across) + _ASIDE, _DOWN)
+
+
+def draw(
+    world: World,
+    snapshot: Snapshot,
+    size: tuple[int, int] = (640, 480),
+    camera: Camera | None = None,
+) -> Picture:
+    """(height, width, 3) of one snapshot. Raises: SimulationError where nothing can draw."""
+    world.place(snapshot.q, snapshot.elapsed)
+    return world.picture(list(_marks(snapshot)), size, camera)
+
+
+def animate(
+    recording: Recording,
+    path: str | Path,
+    fps: float = 8.0,
+    *,
+    size: tuple[int, int] = (480, 360),
+    camera: Camera | None = None,
+    seconds: float | None = None,
+) -> Path:
+    """Writes the run as a GIF that plays in real time.
+
+    Args:
+        recording: of a run.
+        path: where to.
+        fps: pictures a second.
+        size: width and height in pixels.
+        camera: where to look from.
+        seconds: of the run; left out: all.
+
+    Raises:
+        ConfigError: the file cannot be written.
+        SimulationError: nothing can draw here.
+    """
+    end = recording.ticks[-1].given.time if recording.ticks else 0.0
+    times = np.arange(0.0, min(end, seconds or end) + 1e-9, 1.0 / fps)
+    replay = Replay(recording)
+    scenario = replay.setup.scenario
+    world = World(replay.setup.robot, scenario.drawn(), scenario.floor, replay.setup.scene.names)
+    try:
+        frames = [
+            Image.fromarray(draw(world, snapshot, size, camera or viewpoint(replay.setup)))
+            for snapshot in snapshots(recording, times.tolist())
+        ]
+    finally:
+        world.close()
+    write_gif(frames, Path(path), fps)
+    return Path(path)
+
+
+def write_gif(frames: Sequence[Image.Image], path: Path, fps: float) -> None:
+    """One palette for all frames, no dithering: still pixels stay still, and the file small.
+
+    Raises:
+        ConfigError: the file cannot be written.
+    """
+    samples = [frames[round(at)] for at in np.linspace(0, len(frames) - 1, 6)]
+    width, height = frames[0].size
+    sheet = Image.new("RGB", (width, 7 * height))
+    for place, sample in enumerate(samples):
+        sheet.paste(sample, (0, place * height))
+    # The marks are small: without a field of their own they would get no colour of the palette.
+    for place, color in enumerate((_FILTERED, _RAW, _PAIR, *_AXES)):
+        for shade in range(4):
+            swatch = tuple(round((0.45 + 0.18 * shade) * 255.0 * part) for part in color[:3])
+            box = (place * width // 6, 6 * height + shade * height // 4)
+            sheet.paste(swatch, (*box, box[0] + width // 6, box[1] + height // 4))
+    palette = sheet.quantize(_GIF_COLORS)
+    plain = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
+    try:
+        plain[0].save(
+            path, save_all=True, append_images=plain[1:], duration=round(1000.0 / fps), loop=0,
+            optimize=False,
+        )  # fmt: skip
+    except OSError as error:
+        raise ConfigError(f"picture {path}: cannot be written: {error.strerror or error}") from None
+
+
+def _marks(snapshot: Snapshot) -> Iterator[Spheres | Arrow]:
+    result, goal = snapshot.tick.result, snapshot.tick.given.goal
+    yield Spheres(without(snapshot.raw_W, snapshot.cloud_W), 0.005, _RAW)
+    yield Spheres(snapshot.cloud_W, 0.008, _FILTERED)
+    if result.control_W is not None and result.obstacle_W is not None:
+        yield Arrow(np.array(result.control_W), np.array(result.obstacle_W), 0.012, _PAIR)
+    for axis, color in enumerate(_AXES):
+        yield Arrow(goal[:3, 3], goal[:3, 3] + 0.15 * goal[:3, axis], 0.008, color)

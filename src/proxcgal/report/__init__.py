@@ -1,0 +1,1 @@
+"""The report of a results folder: one self-contained HTML page."""

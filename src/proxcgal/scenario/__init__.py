@@ -1,0 +1,1 @@
+"""Scenario files: keys, loading, and the set-up of what runs."""

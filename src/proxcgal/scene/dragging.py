@@ -1,0 +1,110 @@
+"""Solids of a scene that somebody holds and moves; the others go their own way."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxcgal.scene.arm_follower import arms
+from proxcgal.scene.obstacles import Scene
+from proxcgal.scene.solids import Solid
+
+Array = NDArray[np.float64]
+
+SPEED = 1.0  #: [m/s] at most, of a solid that a hand moves
+
+
+class Hands:
+    """Solids that somebody holds, by name; each goes where it is wanted, no faster than a bound."""
+
+    def __init__(self, speed: float = SPEED) -> None:
+        """Args: `speed` at most [m/s]."""
+        self._speed = speed
+        self._poses: dict[str, Array] = {}
+        self._wanted: dict[str, Array] = {}
+        self._velocity: dict[str, Array] = {}
+
+    @property
+    def held(self) -> Mapping[str, Array]:
+        """Where the held solids are, (4, 4) T_WO by name."""
+        return self._poses
+
+    def move(self, name: str, now: Array, wanted: Array) -> None:
+        """Takes a solid, where nobody held it, and says where it is to go.
+
+        Args:
+            name: of the solid.
+            now: (4, 4) T_WO where it is.
+            wanted: (4, 4) T_WO; turned at once, moved at bounded speed.
+        """
+        self._poses.setdefault(name, np.array(now))
+        self._wanted[name] = np.array(wanted)
+
+    def release(self) -> None:
+        """Lets all go: each is again where its own way has it."""
+        for kept in (self._poses, self._wanted, self._velocity):
+            kept.clear()
+
+    def advance(self, period: float) -> None:
+        """Moves what is held for so long [s]."""
+        for name, wanted in self._wanted.items():
+            pose = self._poses[name]
+            step = wanted[:3, 3] - pose[:3, 3]
+            far = float(np.linalg.norm(step))
+            step *= min(1.0, self._speed * period / max(far, 1e-12))
+            moved = wanted.copy()
+            moved[:3, 3] = pose[:3, 3] + step
+            self._poses[name] = moved
+            self._velocity[name] = step / period
+
+    def velocity(self, name: str) -> Array:
+        """(3,) of a held solid's origin, in world [m/s]."""
+        return self._velocity.get(name, np.zeros(3))
+
+
+class LiveScene:
+    """A scene some of whose solids are held; the others go their own way.
+
+    A person's hand takes the arm along.
+    """
+
+    still = False
+
+    def __init__(self, scene: Scene, hands: Hands, since: float = 0.0) -> None:
+        """Args: the scene's own time begins at `since` [s]."""
+        self._scene = scene
+        self._hands = hands
+        self._since = since
+        self._arms = arms(scene.names, scene.solids)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the scene."""
+        return self._scene.names
+
+    @property
+    def solids(self) -> tuple[Solid, ...]:
+        """Of the scene."""
+        return self._scene.solids
+
+    def poses(self, time: float) -> Array:
+        """(n, 4, 4) T_WO."""
+        poses = np.array(self._scene.poses(self._since + time))
+        for name, pose in self._held():
+            poses[self.names.index(name)] = pose
+        for arm in self._arms:
+            if arm.hand_name in self._hands.held:
+                arm.follow(poses)
+        return poses
+
+    def twists(self, time: float) -> Array:
+        """(n, 6) in world: velocity of each origin [m/s], angular velocity [rad/s]."""
+        twists = np.array(self._scene.twists(self._since + time))
+        for name, _ in self._held():
+            twists[self.names.index(name)] = (*self._hands.velocity(name), 0.0, 0.0, 0.0)
+        return twists
+
+    def _held(self) -> list[tuple[str, Array]]:
+        return [(name, pose) for name, pose in self._hands.held.items() if name in self.names]

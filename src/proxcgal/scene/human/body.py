@@ -1,0 +1,109 @@
+"""The body as capsules between points: which there are, how thick, where they stand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxcgal.scene.human.subject import radius
+
+Array = NDArray[np.float64]
+
+#: What a motion says where it is, in this order. `head` is its top, `hand` the fingertips.
+POINTS = (
+    "pelvis", "neck", "head",
+    "left_shoulder", "left_elbow", "left_wrist", "left_hand",
+    "right_shoulder", "right_elbow", "right_wrist", "right_hand",
+    "left_hip", "left_knee", "left_ankle",
+    "right_hip", "right_knee", "right_ankle",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A capsule's segment, and the points it reaches between."""
+
+    name: str
+    segment: str
+    start: str
+    end: str
+    open_start: bool = False  # the joint is the centre of its round end, not the end itself
+    open_end: bool = False
+
+
+def _sides(segment: str, start: str, end: str, joint_end: bool) -> list[Part]:
+    return [
+        Part(f"{side}_{segment}", segment, f"{side}_{start}", f"{side}_{end}", True, joint_end)
+        for side in ("left", "right")
+    ]
+
+
+#: Joints are the centres of round ends; where a segment ends free, its round end ends there.
+PARTS = (
+    Part("head", "head", "neck", "head"),
+    Part("torso", "torso", "pelvis", "neck", True, False),
+    *_sides("upper_arm", "shoulder", "elbow", True),
+    *_sides("forearm", "elbow", "wrist", True),
+    *_sides("hand", "wrist", "hand", False),
+    *_sides("thigh", "hip", "knee", True),
+    *_sides("shin", "knee", "ankle", True),
+)
+NAMES = tuple(part.name for part in PARTS)
+_START = np.array([POINTS.index(part.start) for part in PARTS])
+_END = np.array([POINTS.index(part.end) for part in PARTS])
+_UP = np.array([1.0 if part.segment in ("head", "torso") else -1.0 for part in PARTS])
+
+
+def radii(stature: float) -> Array:
+    """(parts,) of the capsules [m]."""
+    return np.array([radius(part.segment, stature) for part in PARTS])
+
+
+def segments(points_W: Array, thickness: Array) -> tuple[Array, Array]:
+    """Centres of the capsules' round ends.
+
+    Args:
+        points_W: (n, POINTS, 3) [m].
+        thickness: (parts,) radii [m].
+
+    Returns:
+        (n, parts, 3) start and end [m].
+    """
+    start, end = points_W[:, _START], points_W[:, _END]
+    along = end - start
+    length = np.linalg.norm(along, axis=-1, keepdims=True)
+    along = along / np.maximum(length, 1e-9)
+    # A free end is drawn in by the radius; never past the segment's middle.
+    inset = np.minimum(thickness[None, :, None], 0.499 * length)
+    start = start + along * inset * np.array([not p.open_start for p in PARTS])[:, None]
+    return start, end - along * inset * np.array([not p.open_end for p in PARTS])[:, None]
+
+
+def upright(along: Array) -> Array:
+    """(..., 3, 3) rotations that turn the world's z axis the least to bring it along (..., 3)."""
+    z = along / np.maximum(np.linalg.norm(along, axis=-1, keepdims=True), 1e-12)
+    x, y, c = z[..., 0], z[..., 1], z[..., 2]
+    level2 = x * x + y * y
+    down = (c < 0.0) & (level2 < 1e-30)  # no turn is the least one
+    # 1 / (1 + c), which cancels where the direction leads down.
+    k = np.where(c < 0.0, (1.0 - c) / np.maximum(level2, 1e-30), 1.0 / (1.0 + np.maximum(c, 0.0)))
+    R = np.empty((*z.shape[:-1], 3, 3))
+    R[..., 0, 0], R[..., 0, 1], R[..., 0, 2] = 1.0 - k * x * x, -k * x * y, x
+    R[..., 1, 0], R[..., 1, 1], R[..., 1, 2] = -k * x * y, 1.0 - k * y * y, y
+    R[..., 2, 0], R[..., 2, 1], R[..., 2, 2] = -x, -y, c
+    R[down] = np.diag((1.0, -1.0, -1.0))
+    return R
+
+
+def poses(start: Array, end: Array) -> Array:
+    """(..., parts, 4, 4) T_WO of capsules between their round ends' centres (..., parts, 3) [m].
+
+    The z axis leads upwards in somebody who stands with hanging arms.
+    """
+    T_WO = np.zeros((*start.shape[:-1], 4, 4))
+    T_WO[..., :3, :3] = upright((end - start) * _UP[:, None])
+    T_WO[..., :3, 3] = 0.5 * (start + end)
+    T_WO[..., 3, 3] = 1.0
+    return T_WO

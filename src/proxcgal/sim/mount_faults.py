@@ -1,0 +1,77 @@
+"""Where the simulated sensors really sit, and the look at the arm itself before a run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxcgal import _core
+from proxcgal.core.errors import ConfigError
+from proxcgal.models.mount_check import MountChecks, check_mounts
+from proxcgal.models.self_view import rotation_by
+from proxcgal.scenario.keys import MOUNT_FAULTS, Fault
+from proxcgal.sim.faults import rows_of, value_of
+
+if TYPE_CHECKING:
+    from proxcgal.scenario.setup import Setup
+    from proxcgal.sim.source import SimulatedSource
+
+Array = NDArray[np.float64]
+
+SCANS = 30  #: of each sensor before a run: 2 s at 15 Hz
+_STREAM = 3  # of the seed; noise and other faults draw from others
+
+
+class RealMounts:
+    """The sensors' mounts in the world, which `mount_` faults move from where they should be."""
+
+    def __init__(self, mounts: Sequence[_core.Mount], faults: Sequence[Fault], seed: int) -> None:
+        """Args: `mounts` as the controller has them; `faults` of the scenario, whatever kind."""
+        self._T_LS: Array = np.array([mount.T_LS for mount in mounts]).reshape(-1, 4, 4)
+        names = [mount.name for mount in mounts]
+        self._moved: list[tuple[Fault, int, Array]] = []
+        for place, fault in enumerate(faults):
+            if fault.kind not in MOUNT_FAULTS:
+                continue
+            for row in sorted(rows_of(fault, names) or ()):
+                drawn = np.random.default_rng([seed, _STREAM, place, row]).standard_normal(3)
+                axis = np.eye(3)["xyz".index(fault.axis)] if fault.axis else drawn
+                by = value_of(fault) * axis / np.linalg.norm(axis)
+                T_SS = np.eye(4)
+                if fault.kind == "mount_offset":
+                    T_SS[:3, 3] = by
+                else:
+                    T_SS[:3, :3] = rotation_by(by)
+                self._moved.append((fault, row, T_SS))
+
+    def at(self, time: float) -> Array:
+        """(n, 4, 4) T_LS of every sensor at that time of the run."""
+        if not self._moved:
+            return self._T_LS
+        T_LS = self._T_LS.copy()
+        for fault, row, T_SS in self._moved:
+            if fault.start <= time and (fault.end is None or time < fault.end):
+                T_LS[row] = T_LS[row] @ T_SS
+        return T_LS
+
+
+def look(setup: Setup, source: SimulatedSource) -> MountChecks:
+    """What the sensors' view of the arm at its start says of their mounts."""
+    return check_mounts(setup.robot, setup.skin, setup.q0, source.standing(SCANS))
+
+
+def require_mounts(setup: Setup, source: SimulatedSource) -> MountChecks:
+    """The same. Raises: ConfigError: mounts that are wrong, one line each."""
+    checks = look(setup, source)
+    if not checks:
+        name = setup.scenario.name
+        lines = [f"scenario {name}: skin: {check}" for check in checks.wrong]
+        raise ConfigError(
+            "\n".join(lines) + f"\nscenario {name}: sensors do not sit where the skin says, by "
+            "what they see of the arm itself; mend their mounts, or leave the check out with "
+            "skin.check_mounts=false"
+        )
+    return checks

@@ -1,0 +1,101 @@
+"""What all sensors see of a scene, from a robot that stands still."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxcgal import _core
+from proxcgal.scenario.loading import Scenario
+from proxcgal.scenario.setup import Setup
+from proxcgal.sim.range_sensor import ZONES
+from proxcgal.sim.source import SimulatedSource
+from proxcgal.sim.tick import TickInput
+from proxcgal.sim.world import World
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Snapshot:
+    """Scans of every sensor, and their points: scan by scan, sensor by sensor, zone by zone."""
+
+    setup: Setup  #: robot with the meshes that the filter used, skin, posture `q0`, goal
+    scans: tuple[_core.Scan, ...]
+    origins_W: Array  #: (n, 3) [m] emitter of each point
+    points_W: Array  #: (n, 3) [m] all that was sensed, the robot itself included
+    tolerance: Array  #: (n,) [m] epsilon of the filter: grows with the range's noise
+    environment: NDArray[np.bool_]  #: (n,) true where the filter keeps the point
+
+    def within(self, reach: float) -> Self:
+        """The same without the points whose ray is longer than that [m]."""
+        near = np.linalg.norm(self.points_W - self.origins_W, axis=1) <= reach
+        return replace(
+            self, origins_W=self.origins_W[near], points_W=self.points_W[near],
+            tolerance=self.tolerance[near], environment=self.environment[near],
+        )  # fmt: skip
+
+
+def take_snapshot(scenario: Scenario, scans: int = 1) -> Snapshot:
+    """Simulates the first scans of a scenario, and filters them as its controller does.
+
+    Noise, dropout and self-hits are those of a run with the scenario's seed; the arm is not moved,
+    faults are left out, and the sensors measure together even where they would take turns.
+
+    Args:
+        scenario: robot, posture, sensors, scene.
+        scans: of each sensor; their points come one scan after the other.
+
+    Raises:
+        ConfigError: what of the scenario does not fit the robot.
+        SimulationError: the simulator warned.
+    """
+    simulation = scenario.simulation.model_copy(update={"stagger": False})
+    long_enough = max(scenario.duration, (scans + 1) / simulation.sensor_hz)
+    changed: dict[str, Any] = {
+        "simulation": simulation, "duration": long_enough, "faults": (),
+    }  # fmt: skip
+    setup = Setup.of(scenario.model_copy(update=changed))
+    source = SimulatedSource(setup, World(setup.robot, setup.scene), scenario.seed)
+    law = setup.make_controller("wb")
+    taken: list[Snapshot] = []
+    while len(taken) < scans and (given := source.read()) is not None:
+        law.tick(given.time, given.q, list(given.scans), given.goal)
+        if given.scans:
+            kept = np.zeros((len(setup.skin), ZONES), bool)
+            kept[tuple(np.asarray(law.cloud_origins()).T)] = True
+            taken.append(_placed(setup, given, kept))
+    return Snapshot(
+        setup=setup,
+        scans=tuple(scan for part in taken for scan in part.scans),
+        origins_W=np.concatenate([part.origins_W for part in taken]),
+        points_W=np.concatenate([part.points_W for part in taken]),
+        tolerance=np.concatenate([part.tolerance for part in taken]),
+        environment=np.concatenate([part.environment for part in taken]),
+    )
+
+
+def _placed(setup: Setup, given: TickInput, kept: NDArray[np.bool_]) -> Snapshot:
+    """One scan of every sensor: what the core's sense stage makes of it, emitters beside."""
+    settings, model = setup.scenario.controller.filter, setup.skin.model
+    poses_W = np.asarray(setup.robot.link_poses(given.q))
+    links = setup.robot.link_names
+    origins, points, tolerances, environment = [], [], [], []
+    for scan in given.scans:
+        mount = setup.skin.mounts[scan.sensor]
+        T_WS = poses_W[links.index(mount.link)] @ np.asarray(mount.T_LS)
+        zones, points_S, _, sigma = (np.asarray(part) for part in _core.sense(model, scan))
+        points_W = points_S @ T_WS[:3, :3].T + T_WS[:3, 3]
+        above = points_W[:, 2] >= settings.z_min
+        points.append(points_W[above])
+        origins.append(np.tile(T_WS[:3, 3], (len(points[-1]), 1)))
+        tolerances.append(np.maximum(settings.tolerance, settings.sigmas * sigma[above]))
+        environment.append(kept[scan.sensor, zones[above]])
+    return Snapshot(
+        setup=setup, scans=given.scans, origins_W=np.concatenate(origins),
+        points_W=np.concatenate(points), tolerance=np.concatenate(tolerances),
+        environment=np.concatenate(environment),
+    )  # fmt: skip

@@ -1,0 +1,72 @@
+"""What the faults' campaign amounts to, for people: table, sentences, caption, its page."""
+
+from __future__ import annotations
+
+from proxcgal.evaluation.metrics import Summary
+from proxcgal.study.faults.cases import MODES, ROW_OF, ROWS, RUN, TICK_MS, Row
+from proxcgal.study.faults.reliability_page import page, whole_ms
+from proxcgal.study.kind import Listing
+
+
+def listings(summary: Summary) -> list[Listing]:
+    """Row, robot, runs, right mode, latency, worst."""
+    lines = []
+    for robot, rows in summary["robots"].items():
+        for name, found in rows.items():
+            row = ROW_OF[name]
+            bound = f"{1000 * row.within:.0f} + {TICK_MS}" if row.least > RUN else "-"
+            lines.append(
+                (
+                    name, robot, _required(row), str(found["runs"]), str(found["right"]),
+                    whole_ms(found["latency_median_ms"]), whole_ms(found["latency_max_ms"]), bound,
+                    ", ".join(f"{mode} {n}" for mode, n in found["worst_modes"].items()),
+                )
+            )  # fmt: skip
+    return [
+        Listing(
+            caption="Every fault lasts 0.6 s (one missed deadline, a joint state that is not a "
+            "number: a tick) and begins at a random "
+            "moment, at a random sensor. Right: the required mode in time and no other, the "
+            "finding told, the arm free again 0.5 s after the fault; where no command may change, "
+            "the same commands as without it, to the bit. Latency from the fault's onset, told at "
+            "the next tick (10 ms).",
+            names=("fault", "robot", "required", "runs", "right", "median", "worst", "bound",
+                   "farthest mode"),
+            units=("", "", "", "", "", "ms", "ms", "ms", "runs"),
+            rows=lines, left=3,
+        )
+    ]  # fmt: skip
+
+
+def _required(row: Row) -> str:
+    if row.refused:
+        return "refused"
+    if row.least == row.most:
+        return MODES[row.least]
+    return f"{MODES[row.least]} or {MODES[row.most]}"
+
+
+def verdicts(summary: Summary) -> list[str]:
+    """How many were right, and which rows were not."""
+    wrong = [
+        f"{name} on {robot} ({found['right']} of {found['runs']})"
+        for robot, rows in summary["robots"].items()
+        for name, found in rows.items()
+        if found["right"] < found["runs"]
+    ]
+    runs = sum(found["runs"] for rows in summary["robots"].values() for found in rows.values())
+    told = [f"The behaviour was right in {summary['right']} of {runs} runs."]
+    return [*told, "Not always right: " + "; ".join(wrong) + "."] if wrong else told
+
+
+def captions(summary: Summary) -> dict[str, str]:
+    """What the figure shows."""
+    return {
+        "latency.png": "Time from the fault's onset to the required mode, one dot a run, in the "
+        f"colour of that mode; grey: the bound, which may be passed by a tick of {TICK_MS} ms."
+    }
+
+
+def pages(summary: Summary) -> dict[str, str]:
+    """What docs/reliability.md is a copy of."""
+    return {"reliability.md": page(ROWS, summary, {row.name: _required(row) for row in ROWS})}

@@ -1,0 +1,1 @@
+"""The study of the 12-joint robot."""

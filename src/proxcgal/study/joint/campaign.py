@@ -1,0 +1,146 @@
+"""The 12-joint robot: every scene from every start, with each task on and off, known and sensed."""
+
+from __future__ import annotations
+
+import polars as pl
+
+from proxcgal.core.errors import ConfigError
+from proxcgal.evaluation.metrics import SELF_LIMIT_M, Summary
+from proxcgal.models.macro_micro import part
+from proxcgal.scenario.joint import JointScenario
+from proxcgal.scenario.loading import CONTROLLERS, load_scenario
+from proxcgal.scenario.setup import Setup
+from proxcgal.study.campaign import Campaign, Trial, plain
+from proxcgal.study.jobs import Report
+from proxcgal.study.joint.figures import captions, figures
+from proxcgal.study.joint.metrics import COLUMNS, numbers_of
+from proxcgal.study.joint.texts import listings, verdicts
+from proxcgal.study.kind import Kind, Wishes
+from proxcgal.study.store import Row
+from proxcgal.study.trials import identity, robot_of, simulate
+
+SCENES = (
+    "joint_free", "joint_cylinder", "joint_cylinder_tight", "joint_gate", "joint_behind",
+    "joint_chassis",
+)  # fmt: skip
+#: Stacks that are compared with `full`: the thesis's own, and each task off or added.
+STACKS: dict[str, tuple[str, ...]] = {
+    "full": (),
+    "thesis": ('controller.tasks=["thesis"]',),
+    "no_joint_limits": ('controller.off=["joint_limits"]',),
+    "no_avoidance": ('controller.off=["avoidance"]',),
+    "no_minimum_altitude": ('controller.off=["minimum_altitude"]',),
+    "with_self_collision": (
+        'controller.tasks=["joint_limits", "self_collision", "avoidance", "minimum_altitude", '
+        '"reach"]',
+    ),
+    "with_manipulability": (
+        'controller.tasks=["joint_limits", "avoidance", "minimum_altitude", '
+        '"manipulability_micro", "manipulability_macro", "reach"]',
+    ),
+}
+#: Perceptions other than known: the controller, and what is changed of the scene.
+SENSED = 'perception="sensed"'
+PERCEPTIONS: dict[str, tuple[str, tuple[str, ...]]] = {
+    "sensed": ("wb", (SENSED,)),
+    "sensed_2nd_set": ("wb", (SENSED, "skin.with_optional=true")),
+    "memory": ("wb_memory", (SENSED,)),
+    "memory_2nd_set": ("wb_memory", (SENSED, "skin.with_optional=true")),
+}
+
+
+def plan(wishes: Wishes) -> Campaign:
+    """Known: each stack once, as nothing is drawn there. Sensed: the full stack for each seed.
+
+    Raises:
+        ProxError: a scene that does not load or is of another kind.
+    """
+    trials: list[Trial] = []
+    scenes: dict[str, str] = {}
+    sources = wishes.scenarios or SCENES
+    for source in sources:
+        base = load_scenario(source, wishes.overrides)
+        if not isinstance(base, JointScenario):
+            raise ConfigError(f"--scenario {source}: kind = {base.kind!r}; needs 'joint'")
+        if plain(base.name) in {plain(trial.scenario.name) for trial in trials}:
+            raise ConfigError(f"--scenario {source}: there is another one named {plain(base.name)}")
+        robot = robot_of(base)
+        Setup.of(base, robot)
+        part(robot, base.controller.macro_joints, "macro")  # every run tells both arms
+        scenes |= identity(base, robot)
+
+        def trial(
+            init: str, stack: str, perception: str, controller: str, seed: int,
+            changes: tuple[str, ...], source: str = source, digest: str = robot.digest,
+        ) -> Trial:  # fmt: skip
+            overrides = (*wishes.overrides, f'initial=["{init}"]', *changes)
+            scenario = load_scenario(source, overrides)
+            return Trial(
+                scenario=scenario, source=source, overrides=overrides, controller=controller,
+                seed=seed, robot_digest=digest,
+                tags={"scene": scenario.name, "init": init, "stack": stack,
+                      "perception": perception, "run": seed - wishes.seed},
+            )  # fmt: skip
+
+        for init in base.initial:
+            trials += [
+                trial(init, stack, "known", "wb_known", wishes.seed, changes)
+                for stack, changes in STACKS.items()
+            ]
+            trials += [
+                trial(init, "full", perception, controller, wishes.seed + number, changes)
+                for perception, (controller, changes) in PERCEPTIONS.items()
+                if controller in CONTROLLERS
+                for number in range(wishes.runs)
+            ]
+    description = {
+        "kind": "joint", "seed": wishes.seed, "scenarios": list(sources),
+        "set": list(wishes.overrides), **scenes,
+    }  # fmt: skip
+    return Campaign(description=description, trials=trials, perform=perform, columns=COLUMNS)
+
+
+def perform(trial: Trial, report: Report) -> Row:
+    """One run's numbers."""
+    log = simulate(
+        trial.scenario, trial.controller, trial.seed, report, robot_digest=trial.robot_digest
+    )
+    return numbers_of(log, trial.scenario, robot_of(trial.scenario, trial.robot_digest))
+
+
+def analyse(table: pl.DataFrame, campaign: Campaign) -> Summary:
+    """The numbers of `summary.json`: one entry a run."""
+    done = table.filter(pl.col("error").is_null())
+    tasks = {trial.key: list(trial.scenario.controller.levels) for trial in campaign.trials}
+    keys = [name for name in COLUMNS if name not in ("series", "tasks")]
+    runs = [
+        {"scenario": row["scene"], "init": row["init"], "tasks": tasks[row["key"]]}
+        | {key: row[key] for key in ("stack", "perception", "controller", "seed", *keys)}
+        for row in done.iter_rows(named=True)
+    ]
+    return {
+        "robot": campaign.trials[0].scenario.robot,
+        "runs": runs,
+        "self_min_m": done["self_min_m"].min(),
+        "self_under_limit": int((done["self_min_m"] < SELF_LIMIT_M).sum()) if len(done) else 0,
+    }
+
+
+def worst(table: pl.DataFrame) -> list[str]:
+    """Runs with avoidance that came nearest to an obstacle, the nearest first."""
+    ours = table.filter(pl.col("stack") != "no_avoidance", pl.col("error").is_null())
+    return ours.sort("true_min_m", "key")["key"].to_list()
+
+
+KIND = Kind(
+    title="The 12-joint robot: what each task costs and buys",
+    introduction="A UR10e on the flange of a KUKA KR 150-2, one chain of 12 joints, goals by task "
+    "priority. Every scene from every initial configuration, with the full stack, the thesis's, "
+    "and each task switched off or added; then sensed from the forearm's rings instead of known. "
+    "The scenes' positions, the configurations and the law's numbers come from the code of the "
+    "thesis's author, not from its text; the car body's shell is ours. The robot has no inertias: "
+    "every run is kinematic. Engineering figures from a simulation, not a certificate of any kind.",
+    plan=plan, analyse=analyse, listings=listings, verdicts=verdicts, figures=figures,
+    captions=captions, worst=worst,
+    worst_of="the runs with avoidance, by the least true distance", runs=5,
+)  # fmt: skip

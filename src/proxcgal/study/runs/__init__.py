@@ -1,0 +1,1 @@
+"""Runs of one scenario: results folder, figures, pictures."""

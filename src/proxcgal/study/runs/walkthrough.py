@@ -1,0 +1,162 @@
+"""What `proxcgal run` does with a walk-through: teach, record, play back, draw, tell."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from proxcgal.core.progress import Progress, announce
+from proxcgal.evaluation.metrics import aligned, write_bytes
+
+if TYPE_CHECKING:
+    from proxcgal.scenario.walkthrough import WalkScenario
+    from proxcgal.trial.walkthrough.run import WalkResult
+    from proxcgal.trial.walkthrough.setup import WalkSetup
+
+RECORDING, FIGURE, TABLE, TRAJECTORY = "taught.mcap", "walkthrough.png", "path.csv", "path.json"
+RATINGS = "ratings.png"
+
+
+def run_walkthrough(
+    scenario: WalkScenario, folder: Path, origin: dict[str, Any], *, quiet: bool
+) -> int:
+    """Runs it and fills the folder; prints what it found and the report's path.
+
+    Raises:
+        ConfigError: what does not fit, a guard that contradicts itself, a folder that cannot be
+            written.
+        SimulationError: MuJoCo warned.
+    """
+    from proxcgal.report.report import write_report
+    from proxcgal.study.figures import png
+    from proxcgal.study.runs.results import ready, remove_empty
+    from proxcgal.study.walkthrough.figures import ratings_figure
+    from proxcgal.study.walkthrough.ratings import read_ratings
+    from proxcgal.trial.walkthrough.run import run_walk
+    from proxcgal.trial.walkthrough.setup import WalkSetup
+    from proxcgal.trial.walkthrough.teach import check_duration
+
+    ratings = read_ratings(Path(scenario.ratings)) if scenario.ratings else {}
+    announce(f"setting up {scenario.name}", quiet=quiet)
+    setup = WalkSetup.of(scenario)
+    check_duration(scenario)  # before the files of an older run are removed
+    told = setup.told()
+    print("\n".join(told))
+    made = ready([folder])
+    for name in (RECORDING, FIGURE, TABLE, TRAJECTORY, RATINGS):
+        (folder / name).unlink(missing_ok=True)
+    try:
+        with Progress("teaching", [1.0], "", quiet=quiet) as progress:
+            result = run_walk(
+                setup, seed=scenario.seed, recording=folder / RECORDING,
+                on_progress=lambda share: progress.shares([share]),
+            )  # fmt: skip
+        if ratings:
+            write_bytes(folder / RATINGS, png(ratings_figure(ratings)))
+        summary = _write(setup, result, folder, origin | {"guard": told})
+    finally:
+        remove_empty(made)
+    print("\n".join(lines_of(summary)))
+    print(write_report(folder))
+    return 0
+
+
+def _write(
+    setup: WalkSetup, result: WalkResult, folder: Path, origin: dict[str, Any]
+) -> dict[str, Any]:
+    from proxcgal.evaluation.metrics import write_json, write_text
+    from proxcgal.study.figures import png
+    from proxcgal.study.walkthrough.figures import teach_figure, trip_figure
+    from proxcgal.trial.walkthrough.taught import to_csv, to_trajectory
+
+    scenario = setup.scenario
+    title = f"{scenario.name}: {setup.robot.name}, seed {scenario.seed}"
+    if result.log.trips:
+        figure = trip_figure(result.log, title=title, window=scenario.magnified)
+    else:
+        figure = teach_figure(result, title=title, hand_guiding=scenario.hand_guiding_speed)
+    write_bytes(folder / FIGURE, png(figure))
+    if result.path is not None:
+        write_text(folder / TABLE, to_csv(setup.robot, result.path))
+        write_json(folder / TRAJECTORY, to_trajectory(setup.robot, result.path))
+    summary = {
+        "scenario": scenario.name, "robot": setup.robot.name, "seed": scenario.seed,
+        **result.summary(), "min_distance_m": scenario.guard.min_distance,
+        "iso_distance_m": setup.bounds.protective_distance,
+        "monitored_pairs": list(setup.monitored_pairs),
+        "accepted": [{"item": item, "text": text} for item, text in setup.bounds.accepted],
+        "self_min_m": None,
+    }  # fmt: skip
+    write_text(folder / "scenario.toml", scenario.to_toml())
+    write_json(folder / "run.json", {**origin, "description": scenario.description})
+    write_json(folder / "summary.json", summary)
+    return summary
+
+
+def lines_of(summary: dict[str, Any]) -> list[str]:
+    """What a run found, for a terminal and for a page."""
+    found = []
+    for trip in summary["trips"]:
+        found.append(
+            f"{_cut(trip)}, {summary['latency_cycles']} cycles after the first true violation"
+        )
+    if summary["trips"]:
+        stop = summary["stop_time_s"]
+        found.append(
+            "the arm did not come to rest while it was watched" if stop is None else
+            f"at rest after {stop:.3f} s and {summary['stop_distance_m']:.3f} m of the tool, which "
+            f"came to {summary['peak_after_cut_mps']:.2f} m/s before the brakes held it; "
+            f"minimum distance {summary['min_distance_m']:.3f} m, ISO/TS 15066 "
+            f"{summary['iso_distance_m']:.2f} m"
+        )  # fmt: skip
+    else:
+        found.append(f"no trip; tool up to {summary['max_tcp_speed_mps']:.2f} m/s")
+    if played := summary["playback"]:
+        error = summary["playback_error_m"]
+        found.append(
+            f"taught in {summary['teaching_time_s']:.1f} s, cleaned by at most "
+            f"{1000 * played['cleaned_by_m']:.2f} mm, "
+            + (
+                f"played back up to {_cut(played['trips'][0])}" if played["trips"] else
+                f"played back in {played['time_s']:.1f} s within {1000 * error['max']:.2f} mm "
+                f"({1000 * error['rms']:.2f} mm rms), no trip"
+            )
+        )  # fmt: skip
+    if slow := summary["hand_guiding"]:
+        found.append(
+            f"by the hand-guiding rules the same path takes {slow['teaching_time_s']:.1f} s to "
+            f"teach (tool up to {slow['max_tcp_speed_mps']:.3f} m/s, {slow['trips']} trips)"
+        )
+        found += _unfinished("by the hand-guiding rules", slow)
+    found += _unfinished("at the process's speed", summary)
+    if summary["stops"]:
+        head = ("stop", "brakes", "time", "distance")
+        rows = [
+            (
+                s["case"], f"{100 * s['brake_scale']:.0f}",
+                "none" if s["stop_time_s"] is None else f"{s['stop_time_s']:.3f}",
+                f"{s['stop_distance_m']:.3f}",
+            )
+            for s in summary["stops"]
+        ]  # fmt: skip
+        found.append(aligned([head, ("", "[%]", "[s]", "[m]"), *rows], left=1, heads=2))
+    found += [summary["stops_note"]] if summary.get("stops_note") else []
+    return found
+
+
+def _cut(trip: dict[str, Any]) -> str:
+    """When and why the guard cut the torque."""
+    return (
+        f"{trip['time_s']:.3f} s: {trip['function']} {trip['value']:.3f}, allowed "
+        f"{trip['limit']:.3f}: torque off"
+    )
+
+
+def _unfinished(how: str, taught: dict[str, Any]) -> list[str]:
+    """Says where a teaching without a trip did not come to its path's end."""
+    from proxcgal.trial.walkthrough.teach import REACHED
+
+    left = taught.get("left_m")
+    if left is None or left <= REACHED:
+        return []
+    return [f"{how} the hand let go {left:.3f} m from the path's end: times do not compare"]

@@ -1,0 +1,1 @@
+"""Static scenes with random draws."""

@@ -1,0 +1,178 @@
+"""The timing grid of [WA] III-C and IV-C: both algorithms by both methods, cell by cell."""
+
+from __future__ import annotations
+
+import gc
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxcgal import _core
+from proxcgal.core.errors import SimulationError
+from proxcgal.evaluation.metrics import Summary
+from proxcgal.study.timing.growth import fit_growth
+from proxcgal.study.timing.inputs import Inputs
+
+Array = NDArray[np.float64]
+
+ALGORITHMS = {1: "robot body removal", 2: "closest pair"}
+METHODS = ("paper", "fast")
+SAME_M = 1e-9  # [m] both methods' distances agree to this
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Effort:
+    """How long calls are measured."""
+
+    seconds: float  # each call's own, over all rounds
+    rounds: int  # the calls take turns; each is timed at least once a round, however long it takes
+    most: int  # times of each call, however short it is
+
+
+FULL = Effort(seconds=2.0, rounds=5, most=2000)
+QUICK = Effort(seconds=0.15, rounds=3, most=600)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cell:
+    """One cell's times, as a caller in Python meets them."""
+
+    robot: str
+    vertices: int
+    cloud: str
+    points: int  # that the algorithm is given
+    algorithm: int
+    method: str
+    samples_us: Array  # (n,) wall time of each call
+
+    @property
+    def median_us(self) -> float:
+        """Half of the calls were shorter."""
+        return float(np.median(self.samples_us))
+
+    def numbers(self) -> dict[str, Any]:
+        """The cell as `summary.json` has it."""
+        return {
+            "robot": self.robot, "vertices": self.vertices, "cloud": self.cloud,
+            "points": self.points, "algorithm": self.algorithm, "method": self.method,
+            "median_us": self.median_us,
+            "p99_us": float(np.percentile(self.samples_us, 99)),
+            "max_us": float(self.samples_us.max()),
+        }  # fmt: skip
+
+
+def measure(calls: Mapping[str, Callable[[], object]], effort: Effort) -> dict[str, Array]:
+    """Wall times [us] of calls that take turns: what slows the machine for a while slows all.
+
+    In each round a call is made once to warm up, and then timed for its share of the effort.
+    """
+    samples: dict[str, list[int]] = {name: [] for name in calls}
+    seconds, most = effort.seconds / effort.rounds, max(effort.most // effort.rounds, 1)
+    collects = gc.isenabled()
+    gc.disable()  # its pauses are the interpreter's, not the call's
+    try:
+        for _ in range(effort.rounds):
+            for name, call in calls.items():
+                call()
+                samples[name] += _timed(call, seconds, most)
+    finally:
+        if collects:
+            gc.enable()
+    return {name: np.array(times) / 1000.0 for name, times in samples.items()}
+
+
+def _timed(call: Callable[[], object], seconds: float, most: int) -> list[int]:
+    """[ns] of one or more calls."""
+    times: list[int] = []
+    now = time.perf_counter_ns()
+    end = now + round(1e9 * seconds)
+    while not times or (now < end and len(times) < most):
+        start = time.perf_counter_ns()
+        call()
+        now = time.perf_counter_ns()
+        times.append(now - start)
+    return times
+
+
+def call_of(inputs: Inputs, algorithm: int, method: str) -> Callable[[], Any]:
+    """The call that one cell measures, with all its arguments."""
+    if algorithm == 1:
+        return partial(
+            _core.remove_body, inputs.robot, inputs.q, inputs.origins_W, inputs.points_W,
+            inputs.tolerance, method=method,
+        )  # fmt: skip
+    return partial(_core.closest_pair, inputs.robot, inputs.q, inputs.environment_W, method=method)
+
+
+def time_cells(grid: Iterable[Inputs], effort: Effort) -> Iterator[Cell]:
+    """Measures both algorithms by both methods, one call after another on this thread.
+
+    Raises:
+        SimulationError: the two methods answer differently.
+    """
+    for inputs in grid:
+        for algorithm in ALGORITHMS:
+            calls = {method: call_of(inputs, algorithm, method) for method in METHODS}
+            _compare(inputs, algorithm, *(call() for call in calls.values()))
+            points = inputs.points_W if algorithm == 1 else inputs.environment_W
+            for method, samples_us in measure(calls, effort).items():
+                yield Cell(
+                    robot=inputs.robot.name, vertices=inputs.vertices, cloud=inputs.cloud,
+                    points=len(points), algorithm=algorithm, method=method, samples_us=samples_us,
+                )  # fmt: skip
+
+
+def _compare(inputs: Inputs, algorithm: int, paper: Any, fast: Any) -> None:
+    if algorithm == 1:
+        same = np.array_equal(paper, fast)
+    else:
+        same = abs(paper.distance - fast.distance) <= SAME_M
+    if not same:
+        raise SimulationError(
+            f"{inputs.robot.name}, {inputs.vertices} vertices, cloud {inputs.cloud}: 'paper' and "
+            f"'fast' answer Algorithm {algorithm} differently: {paper!r}, {fast!r}"
+        )
+
+
+def sweep_summary(cells: Sequence[Cell], machine: str) -> Summary:
+    """Content of the grid's `summary.json`: `machine`, `cells`, `growth`."""
+    return {
+        "machine": machine,
+        "cells": [cell.numbers() for cell in cells],
+        "growth": growth(cells),
+    }
+
+
+def growth(cells: Sequence[Cell]) -> list[dict[str, Any]]:
+    """Fitted exponents with vertices and with points, beside those of the paper's formulas.
+
+    Per robot, algorithm and method: time ~ x^exponent, fitted to the medians over all cells, with
+    a factor of its own for each cloud (x the vertices) or each resolution (x the points). `formula`
+    is the exponent that the same fit finds in the paper's own cost, (2) or (3), with every constant
+    1: linear in the points, logarithmic in the vertices. Null where there are too few cells.
+    """
+    rows = []
+    keys = dict.fromkeys((cell.robot, cell.algorithm, cell.method) for cell in cells)
+    for robot, algorithm, method in keys:
+        own = [c for c in cells if (c.robot, c.algorithm, c.method) == (robot, algorithm, method)]
+        row: dict[str, Any] = {"robot": robot, "algorithm": algorithm, "method": method}
+        times = [cell.median_us for cell in own]
+        costs = [formula(cell.algorithm, cell.points, cell.vertices) for cell in own]
+        for axis, curve in (("vertices", "cloud"), ("points", "vertices")):
+            x = [float(getattr(cell, axis)) for cell in own]
+            curves = [getattr(cell, curve) for cell in own]
+            fitted, told = fit_growth(x, times, curves), fit_growth(x, costs, curves)
+            row[axis] = {**asdict(fitted), "formula": told.exponent} if fitted and told else None
+        rows.append(row)
+    return rows
+
+
+def formula(algorithm: int, points: int, vertices: int) -> float:
+    """Cost by [WA] (2) or (3), every constant 1, for one link: N M log V + N M, and log V more."""
+    depth = float(np.log2(vertices))
+    return points * depth + points + (depth if algorithm == 2 else 0.0)

@@ -1,0 +1,182 @@
+"""Walk-throughs over time, in the form of [WT] Figs. 6 to 8, and ratings in that of Fig. 9."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from proxcgal.study.figures import DASHED, DPI, GREY, LEGEND
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from proxcgal.trial.walkthrough.log import WalkLog
+    from proxcgal.trial.walkthrough.run import WalkResult
+
+    Array = NDArray[np.float64]
+
+BLUE, ORANGE, RED, GREEN = "#0072B2", "#E69F00", "#D55E00", "#009E73"
+SCALE = 1.08  # of the tallest curve: how high the STO signal is drawn
+_BEFORE, _AFTER = 0.10, 0.45  # [s] of the magnified window, round the trip
+
+
+def trip_figure(log: WalkLog, *, title: str, window: Sequence[float] | None = None) -> Figure:
+    """The quantity that tripped, its limit and the scaled STO signal; beside it, magnified.
+
+    The form of [WT] Fig. 6; where another quantity than the tool's speed trips, that speed stands
+    below it, as in Figs. 7 and 8.
+
+    Args:
+        log: one with a trip.
+        title: above the figure.
+        window: [s] of the magnification; left out: round the stop.
+    """
+    trip = log.trips[0]
+    rows = [(log.tcp_speed, log.tcp_limit, "tool speed [m/s]", trip.function == "tcp_speed")]
+    if trip.function == "distance":
+        rows.insert(0, (log.distance, log.distance_limit, "distance [m]", True))
+    elif trip.function == "relative_velocity":
+        rows.insert(0, (log.velocity, log.velocity_limit, "relative velocity [m/s]", True))
+    elif trip.function == "joint_speed":
+        rows.insert(0, (log.speed_ratio, 1.0, "joint speed, of its bound [-]", True))
+    elif trip.function == "joint_acceleration":
+        rows.insert(0, (log.acceleration_ratio, 1.0, "joint accel., of its bound [-]", True))
+    inside = (trip.time_s - _BEFORE, trip.time_s + _AFTER) if window is None else window
+    figure = Figure(figsize=(8.4, 1.0 + 2.3 * len(rows)), dpi=DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    figure.suptitle(title, fontsize=12, fontweight="bold")
+    axes = figure.subplots(len(rows), 2, squeeze=False, width_ratios=(1.5, 1.0), sharey="row")
+    for (whole, near), (values, limit, label, own) in zip(axes, rows, strict=True):
+        for ax in (whole, near):
+            _curve(ax, log, values, limit if own else None)
+        whole.set_ylabel(label, fontsize=10)
+        whole.set_xlim(0.0, log.time[-1])
+        whole.axvspan(*inside, color=GREY, alpha=0.10, lw=0)
+        near.set_xlim(*inside)
+        near.axvline(trip.time_s, color=RED, lw=0.9, ls=DASHED)
+        stop = log.stop_time_s()
+        if stop is not None and np.isfinite(stop):
+            near.axvline(trip.time_s + stop, color=GREEN, lw=0.9, ls=DASHED)
+    _stop_arrow(axes[-1][1], log)
+    for ax in axes[-1]:
+        ax.set_xlabel("time [s]", fontsize=10)
+    handles, labels = axes[0][0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3, **LEGEND)
+    return figure
+
+
+def _curve(ax: Axes, log: WalkLog, values: Array, limit: float | None) -> None:
+    finite = values[np.isfinite(values)]
+    top = SCALE * max(float(finite.max(initial=0.0)), limit or 0.0)
+    ax.plot(log.time, values, color=BLUE, lw=1.4, label="measured")
+    if limit is not None:
+        ax.axhline(limit, color=GREY, lw=1.0, ls=(0, (1, 1.5)), label="limit")
+    ax.step(log.time, np.where(log.torque, top, 0.0), color=ORANGE, lw=1.3, where="post",
+            label="STO, scaled")  # fmt: skip
+    low = min(0.0, float(finite.min(initial=0.0)))
+    ax.set_ylim(1.05 * low, 1.06 * top)
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.tick_params(labelsize=9)
+
+
+def _stop_arrow(ax: Axes, log: WalkLog) -> None:
+    stop = log.stop_time_s()
+    if stop is None or not np.isfinite(stop):
+        return
+    at, height = log.trips[0].time_s, 0.62 * ax.get_ylim()[1]
+    ax.annotate("", (at, height), (at + stop, height), arrowprops={"arrowstyle": "<->", "lw": 0.9})
+    ax.text(at + stop + 0.015, height, f"at rest after\n{stop:.3f} s", fontsize=9, va="center")
+
+
+def teach_figure(result: WalkResult, *, title: str, hand_guiding: float) -> Figure:
+    """Speed while teaching, fast and by the hand-guiding rules; the path taught and played back.
+
+    Args:
+        result: one that was taught to the end.
+        title: above the figure.
+        hand_guiding: [m/s] of those rules.
+    """
+    log, path, played = result.log, result.path, result.played
+    assert path is not None
+    assert played is not None
+    figure = Figure(figsize=(8.4, 6.6), dpi=DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    figure.suptitle(title, fontsize=12, fontweight="bold")
+    grid = figure.add_gridspec(3, 2, height_ratios=(1.5, 1.5, 1.0))
+    speed, distance = figure.add_subplot(grid[0, :]), figure.add_subplot(grid[1, 0])
+    plane, error = figure.add_subplot(grid[1, 1]), figure.add_subplot(grid[2, :])
+    top = SCALE * log.tcp_limit
+    speed.step(log.time, np.where(log.torque, top, 0.0), color=ORANGE, lw=1.3, where="post",
+               label="STO, scaled")  # fmt: skip
+    if result.slow is not None:
+        slow = result.slow
+        speed.plot(
+            slow.time, slow.tcp_speed, color=GREEN, lw=1.2, label="by the hand-guiding rules"
+        )
+        speed.axhline(hand_guiding, color=GREEN, lw=0.9, ls=(0, (1, 1.5)))
+    speed.plot(log.time, log.tcp_speed, color=BLUE, lw=1.4, label="at the process's speed")
+    speed.axhline(log.tcp_limit, color=GREY, lw=1.0, ls=(0, (1, 1.5)), label="limits")
+    speed.set_ylabel("tool speed [m/s]", fontsize=10)
+    speed.set_xlabel("time [s]", fontsize=10)
+    speed.set_xlim(left=0.0)
+    speed.set_ylim(0.0, 1.06 * top)
+    speed.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4, **LEGEND)
+    distance.plot(log.time, log.distance, color=BLUE, lw=1.4, label="distance")
+    distance.plot(log.time, log.protective_m, color=RED, lw=1.1, label="ISO/TS 15066 would ask for")
+    distance.axhline(log.distance_limit, color=GREY, lw=1.0, ls=(0, (1, 1.5)), label="limit")
+    distance.set_ylim(0.0, 1.5 * float(log.protective_m.max()))
+    distance.set_ylabel("robot to operator [m]", fontsize=10)
+    distance.set_xlabel("time [s]", fontsize=10)
+    distance.legend(loc="upper left", ncols=1, **LEGEND)
+    taught, ran = path.raw_tool_W, played.log.tool_W[-len(played.error_m) :]
+    plane.plot(taught[:, 1], taught[:, 2], color=BLUE, lw=2.4, alpha=0.5, label="taught")
+    plane.plot(ran[:, 1], ran[:, 2], color="black", lw=0.8, label="played back")
+    plane.set_aspect("equal", adjustable="datalim")
+    plane.set_xlabel("y [m]", fontsize=10)
+    plane.set_ylabel("z [m]", fontsize=10)
+    plane.legend(loc="upper right", **LEGEND)
+    times = np.arange(len(played.error_m)) * log.period
+    error.plot(times, 1000.0 * played.error_m, color=BLUE, lw=1.2)
+    error.set_ylabel("played\nfrom taught [mm]", fontsize=10)
+    error.set_xlabel("time of the playback [s]", fontsize=10)
+    error.set_xlim(0.0, times[-1])
+    error.set_ylim(bottom=0.0)
+    for ax in (speed, distance, plane, error):
+        ax.spines[["top", "right"]].set_visible(False)
+        ax.tick_params(labelsize=9)
+    return figure
+
+
+def ratings_figure(ratings: Mapping[str, Sequence[float]]) -> Figure:
+    """Box plot and histogram of each indicator, in the form of [WT] Fig. 9.
+
+    Args:
+        ratings: 0 to 10 of each tester, by indicator.
+    """
+    count = max(len(ratings), 1)
+    figure = Figure(figsize=(6.4, 0.4 + 2.5 * count), dpi=DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    grid = figure.subplots(count, 2, squeeze=False, width_ratios=(1.0, 2.2))
+    for (box, bars), (name, values) in zip(grid, ratings.items(), strict=True):
+        box.boxplot(
+            [list(values)], showmeans=True, widths=0.5, tick_labels=[""],
+            medianprops={"color": ORANGE, "lw": 1.8},
+            meanprops={"marker": "^", "markerfacecolor": GREEN, "markeredgecolor": GREEN},
+        )  # fmt: skip
+        box.set_ylim(-0.5, 10.5)
+        box.set_ylabel(f"{name}\nrating, 0 to 10", fontsize=10)
+        edges = np.arange(-0.5, 11.0)
+        share = np.histogram(values, edges)[0] / max(len(values), 1)
+        bars.bar(np.arange(11), share, color=BLUE, width=0.8)
+        bars.set_xlabel("rating", fontsize=10)
+        bars.set_ylabel("share of testers", fontsize=10)
+        bars.set_xticks(range(11))
+        for ax in (box, bars):
+            ax.spines[["top", "right"]].set_visible(False)
+            ax.tick_params(labelsize=9)
+    return figure

@@ -1,0 +1,1 @@
+"""One trial: simulated, interactive, or a walk-through."""

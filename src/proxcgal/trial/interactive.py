@@ -1,0 +1,178 @@
+"""A trial that goes on for as long as somebody watches: solids moved by hand, sensors silenced.
+
+The same way through as every trial: source -> injected faults -> tick.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxcgal.evaluation.ground_truth import Truth
+from proxcgal.models import Robot
+from proxcgal.scenario.loading import Scenario
+from proxcgal.scenario.setup import Setup
+from proxcgal.scene.dragging import Hands, LiveScene
+from proxcgal.sim.faults import FaultInjector
+from proxcgal.sim.loop import run_ticks
+from proxcgal.sim.moment import Moment
+from proxcgal.sim.mount_faults import require_mounts
+from proxcgal.sim.source import SimulatedSource
+from proxcgal.sim.tick import TickInput, TickResult
+from proxcgal.sim.world import World
+from proxcgal.trial.walkthrough.grip import HAND
+from proxcgal.trial.walkthrough.guided import GuidedScenario, GuidedSource
+
+Array = NDArray[np.float64]
+
+STOP = 3  #: the mode that is latched
+_ENDLESS = 1e7  # [s]
+
+
+class LiveTrial:
+    """A scenario that has no end and takes what somebody does to it, between two ticks."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        controller: str,
+        *,
+        robot: Robot | None = None,
+        q: Array | None = None,
+        hands: Hands | None = None,
+        since: float = 0.0,
+    ) -> None:
+        """Sets everything up.
+
+        Args:
+            scenario: what to run.
+            controller: one of CONTROLLERS.
+            robot: the scenario's, where it is loaded already.
+            q: (n_q,) where the arm starts, instead of the scenario's q0.
+            hands: those that hold solids already.
+            since: of the scene, at the first tick [s].
+
+        Raises:
+            ConfigError: what of the scenario does not fit; sensors that do not sit where it says.
+        """
+        setup = Setup.of(scenario, robot)
+        self.hands = hands or Hands()
+        self.off: frozenset[int] = frozenset()  #: rows of the sensors that are silent
+        self.since = since
+        self.controller = controller
+        scene, measured, drawn = (
+            LiveScene(each, self.hands, since)
+            for each in (setup.scene, setup.measured, setup.drawn)
+        )
+        self.setup = setup = replace(
+            setup,
+            scenario=scenario.model_copy(update={"duration": _ENDLESS}),
+            scene=scene,
+            measured=measured,
+            drawn=drawn,
+            q0=setup.q0 if q is None else np.array(q),
+        )
+        known = setup.known_cloud() if setup.uses_known_points(controller) else None
+        self.law = setup.make_controller(controller, 0 if known is None else len(known))
+        names = [mount.name for mount in setup.skin.mounts]
+        self._faults = FaultInjector(scenario.faults, names, scenario.seed)
+        world = World(setup.robot, scene) if known is None else None
+        make = GuidedSource if isinstance(scenario, GuidedScenario) else SimulatedSource
+        self._source = source = make(setup, world, scenario.seed)
+        if world is not None and scenario.skin.check_mounts and q is None:
+            require_mounts(setup, source)
+        if isinstance(source, GuidedSource) and q is not None:
+            source.take_over()  # its path began elsewhere
+        self._truth = Truth(setup.robot, measured)
+        self._count = 0
+        self._ticks = run_ticks(source, self.law, self._spoiled, known)
+        self._last: tuple[TickInput, TickResult] | None = None
+
+    @property
+    def period(self) -> float:
+        """[s] from tick to tick."""
+        return float(self.law.config.period)
+
+    @property
+    def elapsed(self) -> float:
+        """[s] of the scene's time at the last tick."""
+        return self.since + max(self._count - 1, 0) * self.period
+
+    @property
+    def q(self) -> Array:
+        """(n_q,) where the arm is."""
+        return self._source.q
+
+    @property
+    def stopped(self) -> bool:
+        """Is the controller in STOP? Nothing that the trial is told leads out of it."""
+        return self._last is not None and self._last[1].mode == STOP
+
+    @property
+    def cpu_us(self) -> float:
+        """Of the last tick's thread."""
+        return 0.0 if self._last is None else self._last[1].cpu_us
+
+    def step(self) -> TickResult:
+        """One tick."""
+        self.hands.advance(self.period)
+        self._last = next(self._ticks)
+        self._count += 1
+        return self._last[1]
+
+    def __iter__(self) -> Iterator[TickResult]:
+        """Tick after tick, without end."""
+        while True:
+            yield self.step()
+
+    def move(self, name: str, wanted: Array) -> None:
+        """Has a hand take a solid to a pose (4, 4) T_WO; unknown names are passed over.
+
+        `HAND`, of a guided arm, is the hand at the tool: it no longer goes its own way then.
+        """
+        if name == HAND and isinstance(self._source, GuidedSource):
+            self._source.take_over().move(self._tool(), wanted)
+        elif name in self.setup.scene.names:
+            row = self.setup.scene.names.index(name)
+            now = self.setup.scene.poses(max(self._count - 1, 0) * self.period)[row]
+            self.hands.move(name, now, wanted)
+
+    def release(self) -> None:
+        """Lets go of all that is held."""
+        self.hands.release()
+        if isinstance(self._source, GuidedSource) and self._source.grip is not None:
+            self._source.grip.let_go()
+
+    def moment(self) -> Moment:
+        """What there is to see now, the true distance with it."""
+        assert self._last is not None, "step() comes first"
+        given, result = self._last
+        now = (self._count - 1) * self.period
+        true = self._truth.nearest(self._source.q, now).distance
+        q = given.q if np.isfinite(given.q).all() else self._source.q
+        return Moment.of(
+            self.setup, given, result, self.law, now, q=q, true=true,
+            since=self.since, off=self.off, **self._hand(),
+        )  # fmt: skip
+
+    def _hand(self) -> dict[str, Any]:
+        """The hand at the tool of a guided arm: where it is, and whether somebody holds it."""
+        if not isinstance(self._source, GuidedSource):
+            return {}
+        grip = self._source.grip
+        pose = None if grip is None else grip.pose
+        return {"hand_W": self._tool() if pose is None else pose, "gripped": pose is not None}
+
+    def _tool(self) -> Array:
+        return np.array(self.setup.robot.tool_pose(self._source.q))
+
+    def _spoiled(self, given: TickInput) -> TickInput:
+        """What the controller gets: the scenario's faults, and nothing of silent sensors."""
+        given = self._faults(given)
+        if not self.off:
+            return given
+        return replace(given, scans=tuple(s for s in given.scans if s.sensor not in self.off))

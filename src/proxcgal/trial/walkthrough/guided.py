@@ -1,0 +1,99 @@
+"""A hand at the tool of an arm that its sensors keep away from what they see."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxcgal import _core
+from proxcgal.scenario.walkthrough import GuidedScenario
+from proxcgal.sim.source import SimulatedSource
+from proxcgal.sim.tick import TickInput
+from proxcgal.trial.walkthrough.grip import Grip
+from proxcgal.trial.walkthrough.hand import Hand, rotation_of
+from proxcgal.trial.walkthrough.intended_path import Wish
+
+if TYPE_CHECKING:
+    from proxcgal.evaluation.trial_log import TrialLog
+    from proxcgal.scenario.setup import Setup
+    from proxcgal.sim.world import World
+
+Array = NDArray[np.float64]
+
+__all__ = ["GuidedScenario", "GuidedSource", "off_path", "off_paths"]
+
+
+class GuidedSource(SimulatedSource):
+    """The simulated arm and its sensors; the goal of each tick is where the hand pulls."""
+
+    def __init__(self, setup: Setup, world: World | None, seed: int) -> None:
+        """Args: as `SimulatedSource`; the scenario is a guided one."""
+        super().__init__(setup, world, seed)
+        scenario = cast("GuidedScenario", setup.scenario)
+        self._robot = setup.robot
+        self._gain = scenario.controller.reach_gain
+        self._admittance = _core.Admittance(
+            _core.AdmittanceConfig(**scenario.admittance.model_dump())
+        )
+        self._pace = 1.0 / scenario.simulation.control_hz
+        wish = Wish.of(scenario.legs, self._pace)
+        start = np.array(setup.robot.tool_pose(setup.q0))
+        self._hand = Hand(scenario.hand, wish, start, self._pace, seed)
+        self._cycle = 0
+        self._twist = np.zeros(6)
+        self._J = np.zeros((6, setup.robot.n_q))
+        self._keys = scenario.hand
+        #: A hand that somebody moves, in place of the one with a path in mind.
+        self.grip: Grip | None = None
+
+    def read(self) -> TickInput | None:
+        """The next tick's inputs: the goal is one step of the hand ahead of the tool."""
+        given = super().read()
+        if given is None:
+            return None
+        T = np.array(self._robot.tool_pose(given.q))
+        self._J = np.array(self._robot.tool_jacobian(given.q))
+        tool = T[:3, 3], T[:3, :3], self._twist
+        if self.grip is None:
+            force, engaged = self._hand.force(self._cycle, *tool), True
+        else:
+            force, engaged = self.grip.force(*tool), self.grip.holds
+        wanted = np.array(self._admittance.step(force, engaged, self._pace))
+        self._cycle += 1
+        goal = T.copy()
+        goal[:3, 3] += wanted[:3] / self._gain
+        goal[:3, :3] = rotation_of(wanted[3:] / self._gain) @ T[:3, :3]
+        return replace(given, goal=goal)
+
+    def take_over(self) -> Grip:
+        """The hand that somebody moves from now on; it holds nothing yet."""
+        if self.grip is None:
+            self.grip = Grip(self._keys, self._pace)
+        return self.grip
+
+    def command(self, qd: Array) -> None:
+        """Velocity until the next tick (n_q,); the hand feels what became of its pull."""
+        super().command(qd)
+        self._twist = self._J @ qd
+        self._admittance.held_to(self._twist)
+
+
+def off_path(scenario: GuidedScenario, log: TrialLog) -> Array:
+    """(n,) how far the tool is from the nearest point of the path that the hand wishes [m]."""
+    wish = Wish.of(scenario.legs, 0.005)
+    path = log.tool_W[0] + wish.position
+    found: Array = np.array([np.linalg.norm(path - tool, axis=1).min() for tool in log.tool_W])
+    return found
+
+
+def off_paths(scenario: GuidedScenario, logs: Sequence[TrialLog]) -> dict[str, dict[str, float]]:
+    """The most and the root mean square of it, by controller [m]."""
+    found = {log.controller: off_path(scenario, log) for log in logs}
+    return {
+        name: {"max": float(apart.max()), "rms": float(np.sqrt((apart**2).mean()))}
+        for name, apart in found.items()
+    }

@@ -1,0 +1,165 @@
+"""The operator's hand on the handle: spring and damper, bounded, trembling, slow to react."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxcgal.scenario.walkthrough import Hand as HandKeys
+from proxcgal.trial.walkthrough.intended_path import Wish
+
+Array = NDArray[np.float64]
+
+_TREMOR_HZ = (8.0, 12.0)
+_TONES = 6  # sinusoids of random frequency and phase that make a tremor
+_LETTING_GO = 0.10  # [s] in which a hand that has noticed the stop lets go
+
+
+class Pull:
+    """Spring and damper between the tool and where a hand wants it, bounded.
+
+    Once the arm has stopped it goes on for the reaction time, and then lets go.
+    """
+
+    def __init__(self, keys: HandKeys, period: float) -> None:
+        """Args: one step takes `period` [s]."""
+        self._keys = keys
+        self._period = period
+        self._delay = round(keys.reaction_time / period)
+        self._stopped_for = 0
+        self._force = np.zeros(6)
+
+    @property
+    def delay(self) -> int:
+        """Steps of the reaction time."""
+        return self._delay
+
+    @property
+    def gone(self) -> bool:
+        """Has it let go, after a stop?"""
+        return self._held() <= 0.0
+
+    def force(
+        self,
+        tool: tuple[Array, Array, Array],
+        position: Array,
+        rotation: Array,
+        twist: Array,
+        extra: Array | None = None,
+    ) -> Array:
+        """What it does at the tool's origin (6,), in world [N], [N m]; reused, copy what you keep.
+
+        Args:
+            tool: where that is: (3,) [m], (3, 3) R_WT, (6,) twist, linear first [m/s], [rad/s].
+            position: (3,) where it is wanted [m].
+            rotation: (3, 3) R_WT wanted.
+            twist: (6,) of what is wanted [m/s], [rad/s].
+            extra: (3,) beside spring and damper [N].
+        """
+        keys, force = self._keys, self._force
+        force[:3] = keys.stiffness * (position - tool[0])
+        force[:3] += keys.damping * (twist[:3] - tool[2][:3])
+        if extra is not None:
+            force[:3] += extra
+        force[3:] = keys.turn_stiffness * _turn_between(tool[1], rotation)
+        force[3:] += keys.turn_damping * (twist[3:] - tool[2][3:])
+        _bound(force[:3], keys.max_force)
+        _bound(force[3:], keys.max_torque)
+        if self._stopped_for > self._delay:
+            force *= max(self._held(), 0.0)
+        return force
+
+    def feel_stop(self) -> None:
+        """The arm does not follow, for one more step."""
+        self._stopped_for += 1
+
+    def _held(self) -> float:
+        """Share of the force that a hand has left which notices a stop."""
+        return 1.0 - (self._stopped_for - self._delay) * self._period / _LETTING_GO
+
+
+class Hand:
+    """Pulls the tool along a wished path; lets go once it has noticed that the arm has stopped."""
+
+    def __init__(self, keys: HandKeys, wish: Wish, start: Array, period: float, seed: int) -> None:
+        """Args: `start` (4, 4) T_WT where the path begins; the seed fixes the tremor."""
+        self._pull = Pull(keys, period)
+        self._wish = wish
+        self._start = np.array(start)
+        self._twist = np.zeros(6)
+        self._tremor = _tremor(len(wish) + self._pull.delay, period, keys.tremor, seed)
+
+    @property
+    def cycles(self) -> int:
+        """From the signal to start until the path's end."""
+        return len(self._wish) + self._pull.delay
+
+    def force(self, cycle: int, position: Array, rotation: Array, twist: Array) -> Array:
+        """What it does at the tool's origin (6,), in world [N], [N m].
+
+        Args:
+            cycle: since the signal to start.
+            position: (3,) of the tool [m].
+            rotation: (3, 3) R_WT.
+            twist: (6,) of the tool, linear first [m/s], [rad/s].
+        """
+        wish = self._wish
+        row = min(max(cycle - self._pull.delay, 0), len(wish) - 1)
+        self._twist[:3], self._twist[3:] = wish.velocity[row], wish.spin[row]
+        return self._pull.force(
+            (position, rotation, twist), self._start[:3, 3] + wish.position[row],
+            rotation_of(wish.turn[row]) @ self._start[:3, :3], self._twist,
+            self._tremor[min(cycle, len(self._tremor) - 1)],
+        )  # fmt: skip
+
+    def feel_stop(self) -> None:
+        """The arm does not follow, for one more cycle."""
+        self._pull.feel_stop()
+
+
+def _bound(vector: Array, most: float) -> None:
+    length = math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
+    if length > most:
+        vector *= most / length
+
+
+def _turn_between(here: Array, there: Array) -> Array:
+    """(3,) rotation vector from one orientation to another, to first order beyond small angles."""
+    axis = np.zeros(3)
+    for column in range(3):
+        a, b = here[:, column], there[:, column]
+        axis[0] += a[1] * b[2] - a[2] * b[1]
+        axis[1] += a[2] * b[0] - a[0] * b[2]
+        axis[2] += a[0] * b[1] - a[1] * b[0]
+    return 0.5 * axis
+
+
+def rotation_of(vector: Array) -> Array:
+    """(3, 3) of a rotation vector [rad]."""
+    x, y, z = (float(v) for v in vector)
+    angle = math.sqrt(x * x + y * y + z * z)
+    if angle < 1e-12:
+        return np.eye(3)
+    x, y, z = x / angle, y / angle, z / angle
+    s, c = math.sin(angle), math.cos(angle)
+    v = 1.0 - c
+    return np.array(
+        (
+            (c + x * x * v, x * y * v - z * s, x * z * v + y * s),
+            (y * x * v + z * s, c + y * y * v, y * z * v - x * s),
+            (z * x * v - y * s, z * y * v + x * s, c + z * z * v),
+        )
+    )
+
+
+def _tremor(cycles: int, period: float, rms: float, seed: int) -> Array:
+    """(n, 3) [N] of 8 to 12 Hz."""
+    generator = np.random.default_rng([seed, 8])
+    time = period * np.arange(cycles)
+    hertz = generator.uniform(*_TREMOR_HZ, (_TONES, 3))
+    phase = generator.uniform(0.0, 2.0 * np.pi, (_TONES, 3))
+    tones = np.sin(2.0 * np.pi * hertz * time[:, None, None] + phase)
+    found: Array = rms * math.sqrt(2.0 / _TONES) * tones.sum(axis=1)
+    return found

@@ -1,0 +1,61 @@
+"""A run as a 3D scene that plays by itself: viser's own format, for a page without a server."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import viser
+
+from proxcgal.sim.moment import Moment
+from proxcgal.viewer.access import NOBODY, close, serve
+from proxcgal.viewer.client_messages import Bounds
+from proxcgal.viewer.drawing import Drawing, furnish
+from proxcgal.viewer.scene_model import Stage
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Played:
+    """One arm's moments, in the order of their time."""
+
+    stage: Stage
+    moments: Sequence[Moment]
+
+
+def exported(first: Played, ghosts: Sequence[Played] = ()) -> bytes:
+    """The scene and how it moves, in real time.
+
+    Args:
+        first: drawn whole.
+        ghosts: other arms in the same scene, see-through; their moments are as many, at the same
+            times.
+
+    Returns:
+        What viser's client plays (zstd inside).
+    """
+    server, _ = serve("127.0.0.1", 0, label="", bounds=Bounds(viewers=NOBODY))
+    try:
+        furnish(server, first.stage)
+        drawings = [Drawing(server.scene, first.stage)]
+        drawings += [
+            Drawing(server.scene, ghost.stage, name=f"/ghost{row}", ghost=True)
+            for row, ghost in enumerate(ghosts)
+        ]
+        played = list(zip(*(each.moments for each in (first, *ghosts)), strict=True))
+        for drawing, moment in zip(drawings, played[0], strict=True):
+            drawing.show(moment)
+        recorded = server.get_scene_serializer()
+        for before, now in pairwise(played):
+            recorded.insert_sleep(now[0].elapsed - before[0].elapsed)
+            for drawing, moment in zip(drawings, now, strict=True):
+                drawing.show(moment)
+        return recorded.serialize()
+    finally:
+        close(server)
+
+
+def player() -> str:
+    """Viser's client: one HTML file that fetches nothing."""
+    return (Path(viser.__file__).parent / "client" / "build" / "index.html").read_text()

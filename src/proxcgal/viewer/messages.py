@@ -1,0 +1,108 @@
+"""What a page and its simulation tell each other, and how that waits to be sent."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections import deque
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxcgal.sim.moment import Posed
+from proxcgal.viewer.choice import Choice
+from proxcgal.viewer.scene_model import Stage
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wishes:
+    """What a page wants since it last spoke; what it does not want anew is None."""
+
+    running: bool | None = None
+    steps: int = 0  #: ticks, while it does not run
+    reset: bool = False  #: the arm back to its start, the time to 0
+    hands: tuple[tuple[str, Array], ...] = ()  #: (4, 4) T_WO that each of these solids is to go to
+    release: bool = False  #: all solids
+    off: frozenset[int] | None = None  #: rows of the sensors that are silent
+    choice: Choice | None = None
+    enable: bool = False  #: press the reset of a walk-through's guard
+    anew: bool = False  #: as `reset`, out of a STOP too: never from a message of a page
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Told:
+    """What the simulation tells a page."""
+
+    moment: Posed | None = None
+    stage: Stage | None = None  #: where it is another one
+    choice: Choice | None = None  #: with the stage: what it was made with
+    refused: bool = False  #: with the choice: another one was wanted, and could not be
+    note: str = ""  #: what could not be done, or is being done
+    late_us: tuple[float, float] = (0.0, 0.0)  #: of the last ticks' wake-ups: median and p99
+    cpu_us: float = 0.0  #: median thread CPU of the last ticks
+    real_time: float = 1.0  #: simulated seconds in one
+    dropped: int = 0  #: moments that the page did not take, so far
+    running: bool = True
+    failed: str = ""  #: why the simulation has ended
+
+
+class Outbox:
+    """One moment at a time, the newest; notes and stages all. Sent by a thread of its own."""
+
+    def __init__(self, link: Connection) -> None:
+        """Args: `link` to the page."""
+        self._link = link
+        self._wake = threading.Condition()
+        self._sure: deque[Told] = deque()
+        self._newest: Told | None = None
+        self._free = True  # the page has taken the last moment
+        self._closed = False
+        self.dropped = 0
+        self._thread = threading.Thread(target=self._send, daemon=True)
+        self._thread.start()
+
+    def offer(self, told: Told) -> None:
+        """Takes the place of what was not sent yet."""
+        with self._wake:
+            self.dropped += self._newest is not None
+            self._newest = told
+            self._wake.notify()
+
+    def tell(self, told: Told) -> None:
+        """Sent whatever happens."""
+        with self._wake:
+            self._sure.append(told)
+            self._newest = None  # older than what is told now
+            self._wake.notify()
+
+    def taken(self) -> None:
+        """The page has drawn what it got."""
+        with self._wake:
+            self._free = True
+            self._wake.notify()
+
+    def close(self) -> None:
+        """What was told is sent, nothing after it, and the thread ends."""
+        with self._wake:
+            self._closed = True
+            self._wake.notify()
+        self._thread.join(timeout=2.0)
+
+    def _send(self) -> None:
+        with contextlib.suppress(OSError, EOFError):
+            while True:
+                with self._wake:
+                    self._wake.wait_for(
+                        lambda: self._sure or self._closed or (self._free and self._newest)
+                    )
+                    if self._sure:
+                        told: Told | None = self._sure.popleft()
+                    elif self._closed:
+                        return
+                    else:
+                        told, self._newest, self._free = self._newest, None, False
+                self._link.send(told)

@@ -1,0 +1,112 @@
+"""Curves of the last seconds: seen and true distance, activation."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import viser
+import viser.uplot
+from numpy.typing import NDArray
+
+from proxcgal.sim.moment import Moment, Posed
+from proxcgal.viewer.scene_model import Stage
+
+Array = NDArray[np.float64]
+Curve = tuple[str, str, tuple[int, ...]]  # label, colour, dashes [px]
+
+SPAN = 10.0  #: [s]
+HIGHEST = 1.0  # [m] farther is drawn there
+_SEEN, _TRUE, _BOUND, _GREEN, _ORANGE = "#d61e28", "#2a5fb0", "#8a8f98", "#10963c", "#dc7814"
+_HEIGHT = 165  # [px]
+
+
+class Plots:
+    """Two plots in the page's panel, over the last 10 s."""
+
+    def __init__(self, gui: viser.GuiApi) -> None:
+        """Adds them."""
+        self._rows: deque[tuple[float, float, float, float]] = deque()
+        self._distance = _distances(gui, ("seen", _SEEN, ()), ("true", _TRUE, (5, 4)))
+        self._activation = _activations(gui, ("activation", _GREEN, ()))
+
+    def add(self, moment: Posed) -> None:
+        """One moment more; a time before the last one begins anew."""
+        assert isinstance(moment, Moment)
+        if self._rows and moment.elapsed < self._rows[-1][0]:
+            self._rows.clear()
+        if self._rows and moment.elapsed == self._rows[-1][0]:
+            self._rows.pop()
+        self._rows.append((moment.elapsed, moment.seen, moment.true, moment.activation))
+        while self._rows[0][0] < moment.elapsed - SPAN:
+            self._rows.popleft()
+
+    def show(self, d_min: float, buffer: float) -> None:
+        """Draws what was added, with the law's two thresholds [m]."""
+        if len(self._rows) < 2:
+            return
+        time, seen, true, activation = np.array(self._rows).T
+        low, high = np.full_like(time, d_min), np.full_like(time, d_min + buffer)
+        self._distance.data = (time, _drawn(seen), _drawn(true), low, high)
+        self._activation.data = (time, activation)
+
+
+def whole_run(
+    gui: viser.GuiApi, moments: Sequence[Moment], again: Sequence[Moment] | None, stage: Stage
+) -> None:
+    """The same plots of a recorded run, and of the one that was computed again beside it."""
+    curves: list[Curve] = [("seen", _SEEN, ()), ("true", _TRUE, (5, 4))]
+    time = np.array([moment.elapsed for moment in moments])
+    distances = [[m.seen for m in moments], [m.true for m in moments]]
+    if again is not None:
+        curves.append(("seen, recomputed", _ORANGE, ()))
+        distances.append([m.seen for m in again])
+    chart = _distances(gui, *curves)
+    bounds = [np.full_like(time, stage.d_min), np.full_like(time, stage.d_min + stage.buffer)]
+    chart.data = (time, *(_drawn(np.array(each)) for each in distances), *bounds)
+    curves = [("activation", _GREEN, ())]
+    activations = [np.array([m.activation for m in moments])]
+    if again is not None:
+        curves.append(("recomputed", _ORANGE, ()))
+        activations.append(np.array([m.activation for m in again]))
+    _activations(gui, *curves).data = (time, *activations)
+
+
+def _distances(gui: viser.GuiApi, *curves: Curve) -> Any:
+    bounds: list[Curve] = [("d_min", _BOUND, (2, 3)), ("d_min + buffer", _BOUND, (2, 3))]
+    return plot(
+        gui, f"distance [m], clipped at {HIGHEST:g}; time [s]", HIGHEST, _HEIGHT, *curves, *bounds
+    )
+
+
+def _activations(gui: viser.GuiApi, *curves: Curve) -> Any:
+    return plot(gui, "activation of avoidance, time [s]", 1.0, _HEIGHT - 45, *curves)
+
+
+def plot(gui: viser.GuiApi, title: str, highest: float, height: int, *curves: Curve) -> Any:
+    """An empty plot over time; what is higher than `highest` is drawn there."""
+    nothing = np.array([0.0, SPAN])
+    return gui.add_uplot(
+        (nothing,) * (1 + len(curves)),
+        (
+            viser.uplot.Series(label="time"),
+            *(
+                viser.uplot.Series(label=label, stroke=stroke, width=1.5 if dash else 2, dash=dash)
+                for label, stroke, dash in curves
+            ),
+        ),
+        title=title,
+        height=height,
+        scales={
+            "x": viser.uplot.Scale(time=False, auto=True),
+            "y": viser.uplot.Scale(auto=False, range=(0.0, 1.04 * highest)),
+        },
+        axes=(viser.uplot.Axis(size=34), viser.uplot.Axis(size=46)),
+        legend={"show": len(curves) > 1, "live": False},
+    )
+
+
+def _drawn(distances: Array) -> Array:
+    return np.minimum(np.nan_to_num(distances, nan=HIGHEST), HIGHEST)

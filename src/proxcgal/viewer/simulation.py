@@ -1,0 +1,207 @@
+"""The simulation beside a page, in a process of its own: real time, whatever the page does.
+
+Towards the page goes at most one moment at a time; what is not fetched is dropped. A thread sends
+it, so that a tick never waits for a page. From the page come wishes; none of them leads out of a
+STOP: only whoever started the command begins anew then.
+"""
+
+from __future__ import annotations
+
+import time as clock
+import warnings
+from collections import deque
+from collections.abc import Iterable
+from multiprocessing.connection import Connection
+from typing import TypeGuard
+
+import numpy as np
+
+from proxcgal.core.errors import ModelWarning, ProxError
+from proxcgal.scenario.loading import Scenario
+from proxcgal.scenario.walkthrough import WalkScenario
+from proxcgal.trial.interactive import LiveTrial
+from proxcgal.trial.walkthrough.interactive import WalkTrial
+from proxcgal.viewer.choice import Choice
+from proxcgal.viewer.messages import Outbox, Told, Wishes
+from proxcgal.viewer.scene_model import Stage
+
+FRAME_HZ = 15.0  #: moments that are offered to the page
+LOST = 0.1  #: [s] behind real time from which what is lost stays lost
+_LATENESS = 1000  # ticks that the lateness is told of
+
+
+def is_walk(scenario: Scenario) -> TypeGuard[WalkScenario]:
+    """Is it the walk-through cell, which has a guard and no law to choose?"""
+    return isinstance(scenario, WalkScenario)
+
+
+def simulate(link: Connection, scenario: Scenario, controller: str, hz: float = FRAME_HZ) -> None:
+    """Runs until the other end of `link` is closed; the target of a process."""
+    outbox = Outbox(link)
+    warnings.simplefilter("ignore", ModelWarning)  # the command's own process has told it
+    try:
+        _Simulation(outbox, link, scenario, controller, hz).run()
+    except (EOFError, BrokenPipeError, ConnectionResetError, KeyboardInterrupt):
+        pass
+    except ProxError as error:
+        outbox.tell(Told(failed=str(error)))
+    except Exception as error:  # the page is to say so, not to stand still
+        outbox.tell(Told(failed=f"{type(error).__name__}: {error}"))
+        raise
+    finally:
+        outbox.close()
+
+
+class _Simulation:
+    """The loop."""
+
+    def __init__(
+        self, outbox: Outbox, link: Connection, scenario: Scenario, controller: str, hz: float
+    ) -> None:
+        self._outbox = outbox
+        self._link = link
+        self._base = scenario
+        self._choice = None if is_walk(scenario) else Choice.of(scenario, controller)
+        self._frame = 1.0 / hz
+        self._off: frozenset[int] = frozenset()
+        self._running = True
+        self._trial: LiveTrial | WalkTrial = (
+            WalkTrial(scenario) if is_walk(scenario) else LiveTrial(scenario, controller)
+        )
+        self._fresh()
+        self._stage()
+
+    def run(self) -> None:
+        """Tick after tick, each when it is due."""
+        due = begin = clock.monotonic()
+        frame_due, simulated, shown = begin, 0.0, -1.0
+        while True:
+            steps = 0
+            for wishes in self._received(wait=0.0 if self._running else 0.02):
+                steps += self._grant(wishes)
+            now = clock.monotonic()
+            if not self._running and steps == 0:
+                due = begin = now
+                simulated = 0.0
+                if shown != self._trial.elapsed or now >= frame_due + 1.0:
+                    frame_due = now
+                    shown = self._trial.elapsed
+                    self._show(1.0)
+                continue
+            for _ in range(max(steps, 1)):
+                self._tick(max(now - due, 0.0) if self._running else None)
+            simulated += self._trial.period
+            if now >= frame_due or not self._running:
+                frame_due = max(frame_due + self._frame, now)
+                shown = self._trial.elapsed
+                self._show(min(simulated / max(clock.monotonic() - begin, 1e-6), 1.0))
+                if clock.monotonic() - begin > 2.0:
+                    begin, simulated = clock.monotonic(), 0.0
+            due = max(due + self._trial.period, clock.monotonic() - LOST)
+            clock.sleep(max(due - clock.monotonic(), 0.0))
+
+    def _received(self, wait: float) -> Iterable[Wishes]:
+        while self._link.poll(wait):
+            wait = 0.0
+            message = self._link.recv()
+            if message is None:
+                self._outbox.taken()
+            else:
+                yield message
+
+    def _grant(self, wishes: Wishes) -> int:
+        """Does what is wanted; how many single ticks are still to be made."""
+        stopped = self._trial.stopped
+        if wishes.anew or (wishes.reset and not stopped):
+            self._restart()
+        elif wishes.reset or (wishes.choice is not None and stopped):
+            self._note(f"{self._latched}: only Enter where `proxcgal view` runs leads out of it")
+        if wishes.choice is not None and not stopped and wishes.choice != self._choice:
+            self._choose(wishes.choice)
+        if wishes.running is not None:
+            self._running = wishes.running
+        if wishes.release:
+            self._trial.release()
+        for name, pose in wishes.hands:
+            self._trial.move(name, pose)
+        if wishes.off is not None:
+            self._off = wishes.off
+            if isinstance(self._trial, LiveTrial):
+                self._trial.off = wishes.off
+        if wishes.enable and isinstance(self._trial, WalkTrial):
+            self._trial.enable()
+        return 0 if self._running else min(wishes.steps, 100)
+
+    @property
+    def _latched(self) -> str:
+        if isinstance(self._trial, WalkTrial):
+            return "a stop took longer than the guard declares"
+        return "the controller has stopped"
+
+    def _restart(self) -> None:
+        """The arm at its start, the time at 0."""
+        old = self._trial
+        if isinstance(old, WalkTrial):
+            self._trial = old.again()
+        else:
+            assert self._choice is not None
+            scenario = self._choice.applied(self._base)
+            self._trial = LiveTrial(scenario, self._choice.controller, robot=old.setup.robot)
+            self._trial.off = self._off
+        self._fresh()
+
+    def _choose(self, choice: Choice) -> None:
+        """Another law or robot, at rest: where the arm is, where that is the same robot."""
+        old, own = self._trial, self._choice
+        if not isinstance(old, LiveTrial) or own is None:
+            return
+        same = (choice.robot, choice.vertices) == (own.robot, own.vertices)
+        keep = choice.robot == own.robot
+        try:
+            self._trial = LiveTrial(
+                choice.applied(self._base), choice.controller,
+                robot=old.setup.robot if same else None, q=old.q if keep else None,
+                hands=old.hands if keep else None, since=old.elapsed if keep else 0.0,
+            )  # fmt: skip
+        except ProxError as error:
+            self._note(str(error))
+            self._stage(refused=True)
+            return
+        if not keep:
+            self._off = frozenset()
+        self._trial.off = self._off
+        self._choice = choice
+        self._fresh()
+        self._stage()
+
+    def _fresh(self) -> None:
+        self._late: deque[float] = deque(maxlen=_LATENESS)
+        self._cpu: deque[float] = deque(maxlen=_LATENESS)
+        self._trial.step()
+
+    def _tick(self, late: float | None) -> None:
+        if late is not None:
+            self._late.append(1e6 * late)
+        self._trial.step()
+        self._cpu.append(self._trial.cpu_us)
+
+    def _show(self, real_time: float) -> None:
+        late = np.array(self._late or [0.0])
+        self._outbox.offer(
+            Told(
+                moment=self._trial.moment(),
+                late_us=(float(np.median(late)), float(np.percentile(late, 99))),
+                cpu_us=float(np.median(self._cpu or [0.0])),
+                real_time=real_time, dropped=self._outbox.dropped, running=self._running,
+            )
+        )  # fmt: skip
+
+    def _stage(self, *, refused: bool = False) -> None:
+        trial = self._trial
+        stage = Stage.of_walk(trial) if isinstance(trial, WalkTrial) else Stage.of(trial.setup)
+        self._outbox.tell(
+            Told(stage=stage, choice=self._choice, running=self._running, refused=refused)
+        )
+
+    def _note(self, text: str) -> None:
+        self._outbox.tell(Told(note=text, running=self._running))
