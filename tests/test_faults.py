@@ -10,6 +10,7 @@ import pytest
 import proxcgal as px
 from proxcgal import _core
 from proxcgal.core.errors import ConfigError
+from proxcgal.core.modes import DEGRADED, HOLD, RUN, STOP
 from proxcgal.recording.reader import Recorder, read_recording
 from proxcgal.recording.render import snapshots
 from proxcgal.scenario.keys import INPUT_FAULTS, Fault
@@ -18,7 +19,7 @@ from proxcgal.sim.faults import FaultInjector
 from proxcgal.sim.tick import TickInput
 from proxcgal.study.campaign import Trial
 from proxcgal.study.faults.campaign import KIND, perform, plan
-from proxcgal.study.faults.cases import DEGRADED, HOLD, ROWS, RUN, STOP
+from proxcgal.study.faults.cases import ROWS
 from proxcgal.study.faults.reliability_page import GOALS, page
 from proxcgal.study.faults.reliability_page import SHOWN as SHOWN_BY_TESTS
 from proxcgal.study.kind import Wishes

@@ -16,13 +16,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import proxcgal as px
+from proxcgal.core.modes import STOP
 from proxcgal.core.transforms import pose
 from proxcgal.models.mesh.display import display_meshes
 from proxcgal.scenario.keys import Fault
 from proxcgal.scenario.loading import Scenario, load_scenario
 from proxcgal.scene.dragging import Hands, LiveScene
 from proxcgal.sim.moment import without
-from proxcgal.trial.interactive import STOP, LiveTrial
+from proxcgal.trial.interactive import LiveTrial
 from proxcgal.trial.trial import run_trial
 from proxcgal.viewer.choice import Choice, robots
 from proxcgal.viewer.command_queue import ROOM, Desk

@@ -12,12 +12,12 @@ from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from proxcgal import _core
+from proxcgal.core.modes import NAMES
 from proxcgal.models import Robot
 from proxcgal.sim.tick import TickResult
 from proxcgal_ros.convert import point
 
 Array = NDArray[np.float64]
-MODES = ("RUN", "DEGRADED", "HOLD", "STOP")
 _LEVELS = (
     DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR, DiagnosticStatus.ERROR
 )  # fmt: skip
@@ -99,7 +99,7 @@ def diagnostics(
     if result is None:
         mode, level, reasons = "no joint states yet", DiagnosticStatus.STALE, ""
     else:
-        mode, level = MODES[result.mode], _LEVELS[result.mode]
+        mode, level = NAMES[result.mode], _LEVELS[result.mode]
         reasons = ", ".join(sorted({found.reason for found in result.findings}))
     controller = DiagnosticStatus(
         level=level, name=f"{node}: controller", hardware_id=hardware, message=mode

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from proxcgal import _core
+from proxcgal.core.modes import STOP
 from proxcgal.evaluation.termination import Outcome, pose_errors
 from proxcgal.models import Robot
 from proxcgal.server.goal_ledger import GoalLedger, Pursued
@@ -27,7 +27,6 @@ from proxcgal_ros.goals import goal_problems
 Array = NDArray[np.float64]
 
 HELD_OFF = 0.5  # activation of avoidance at which an obstacle is why a goal was not reached
-_STOP = int(_core.Mode.STOP.value)
 
 
 @dataclass(slots=True)
@@ -83,7 +82,7 @@ class LiveGoals:
             )
         if self._tool is None:
             problems.append("no joint states yet")
-        if self._last is not None and self._last.mode == _STOP:
+        if self._last is not None and self._last.mode == STOP:
             problems.append(f"the monitor has stopped the arm: {self.rules.way_out}")
         if not self.rules.preempt and self._goals.active is not None:
             problems.append(f"goal {self._goals.active.number} is being pursued")
@@ -143,7 +142,7 @@ class LiveGoals:
         if active is None or self._tool is None:
             return
         errors = pose_errors(self._tool, active.T_WT)
-        if result.mode == _STOP:
+        if result.mode == STOP:
             reasons = ", ".join(sorted({found.reason for found in result.findings}))
             self._end("aborted", f"the monitor stopped the arm: {reasons}")
         elif active.state == "cancelling":

@@ -18,6 +18,7 @@ from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
 from proxcgal.core.errors import ConfigError
+from proxcgal.core.modes import HOLD, NAMES, STOP
 from proxcgal.models import check_mounts
 from proxcgal.recording.writer import Recorder, Settings
 from proxcgal.scenario.loading import CONTROLLERS, change_scenario, load_scenario
@@ -35,7 +36,6 @@ from proxcgal_ros.pacing import CloudPace, Pace
 from proxcgal_ros.source import RosSource
 
 LIVE_CONTROLLERS = tuple(name for name in CONTROLLERS if name != "wb_known")
-_STOP = 3  # of Mode
 VIEWS_HZ = 2.0  # fields of view are many lines
 
 
@@ -193,11 +193,10 @@ class ControllerNode(Node):
             self._diagnose(self._clocks.now())
 
     def _tell_mode(self, before: int, result: TickResult) -> None:
-        names = ("RUN", "DEGRADED", "HOLD", "STOP")
         reasons = ", ".join(sorted({found.reason for found in result.findings}))
-        told = f"{names[before]} -> {names[result.mode]}" + (f": {reasons}" if reasons else "")
+        told = f"{NAMES[before]} -> {NAMES[result.mode]}" + (f": {reasons}" if reasons else "")
         log = self.get_logger()
-        if result.mode >= 2:
+        if result.mode >= HOLD:
             log.warning(told)
         else:
             log.info(told)
@@ -207,7 +206,7 @@ class ControllerNode(Node):
         response.success = bool(self.law.reset())
         if response.success:
             response.message = "left STOP"
-        elif self._last is None or self._last.mode != _STOP:
+        elif self._last is None or self._last.mode != STOP:
             response.message = "not stopped"
         else:
             reasons = ", ".join(sorted({found.reason for found in self._last.findings}))

@@ -12,14 +12,13 @@ import numpy as np
 import tyro
 
 from proxcgal.cli.options import ControllerName, Flag, Settings, flat
+from proxcgal.core import modes
 from proxcgal.core.errors import ConfigError
 
 if TYPE_CHECKING:
     from proxcgal.evaluation.trial_log import TrialLog
     from proxcgal.recording.reader import Recording
     from proxcgal.sim.tick import Tick
-
-MODES = ("RUN", "DEGRADED", "HOLD", "STOP")
 
 
 @dataclass(frozen=True)
@@ -177,7 +176,7 @@ def _lines(log: TrialLog, ticks: Sequence[Tick], every: int) -> Iterator[str]:
         yield (
             f"{log.elapsed[row]:7.2f}  {_metres(log.seen_m[row])}  {_metres(log.true_m[row])}  "
             f"{log.activation[row]:4.2f}  {log.goal_error_m[row]:6.3f}  "
-            f"{MODES[log.mode[row]]:<8}  {log.control_link[row]:<{width}}  {found}"
+            f"{modes.NAMES[log.mode[row]]:<8}  {log.control_link[row]:<{width}}  {found}"
         ).rstrip()
 
 
@@ -243,7 +242,7 @@ def _show_tick(tick: Tick, elapsed: float) -> None:
         ("true", f"{_metres(truth.distance).strip()} {truth.link}"),
         ("own links", _metres(truth.own).strip()),
         ("moves", result.control_link or "nothing"),
-        ("mode", MODES[result.mode]),
+        ("mode", modes.NAMES[result.mode]),
         ("qd", _vector(result.qd)),
     ]
     for task in result.tasks:

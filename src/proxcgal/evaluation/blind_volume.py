@@ -7,18 +7,16 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxcgal import _core
 from proxcgal.core.errors import ConfigError
 from proxcgal.core.transforms import inverse, placed
+from proxcgal.core.typing import Array
 from proxcgal.evaluation.visibility import Eyes
 
 if TYPE_CHECKING:
     from proxcgal.models import Robot
     from proxcgal.scenario.setup import Setup
-
-Array = NDArray[np.float64]
 
 REACH_M = 0.5  #: [m] from the arm's surface: what is farther is not counted
 _SPACING_M = 0.05  # [m] of the points that stand for the volume

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxcgal.core.transforms import inverse, placed
+from proxcgal.core.typing import Array
 from proxcgal.evaluation.ground_truth import Truth
 from proxcgal.evaluation.visibility import Eyes
 
@@ -16,8 +17,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from proxcgal.scenario.setup import Setup
-
-Array = NDArray[np.float64]
 
 EVERY_S = 0.2  #: [s] from one closest point to the next that is looked at
 

@@ -9,17 +9,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxcgal import _core
 from proxcgal.core.transforms import inverse, placed
+from proxcgal.core.typing import Array
 from proxcgal.models.surfaces import Surfaces, moved
 
 if TYPE_CHECKING:
     from proxcgal.models.robots import Robot
     from proxcgal.scene.obstacles import Scene
-
-Array = NDArray[np.float64]
 
 #: Looked for beyond the least distance so far, so that a far pair is not asked at every tick [m].
 AHEAD_M = 0.05

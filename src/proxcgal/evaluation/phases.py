@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from proxcgal.core.typing import Array
 from proxcgal.evaluation.trial_log import NOTHING, sampled_ticks
 
 if TYPE_CHECKING:
@@ -32,5 +32,5 @@ def mean_distances(log: TrialLog, scenario: HriScenario) -> Means:
     return found
 
 
-def _mean(values: NDArray[np.float64]) -> float | None:
+def _mean(values: Array) -> float | None:
     return float(np.minimum(values, NOTHING).mean()) if len(values) else None

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from proxcgal import _core
 from proxcgal.core.transforms import inverse
+from proxcgal.core.typing import Array, Bools
 from proxcgal.evaluation.ground_truth import AHEAD_M, solid_distance
 from proxcgal.models.surfaces import Surfaces, moved
 
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
     from proxcgal.models.robots import Robot
     from proxcgal.scene.obstacles import Scene
     from proxcgal.scene.solids import Solid
-
-Array = NDArray[np.float64]
 
 #: Round ticks that are asked in turn: beyond, their neighbours say more.
 NEAR_TICKS = 25
@@ -38,7 +37,7 @@ class DecisiveTruth:
 
 
 def decisive_truth(
-    robot: Robot, scene: Scene, time: Array, q: Array, wanted: NDArray[np.bool_], under: float
+    robot: Robot, scene: Scene, time: Array, q: Array, wanted: Bools, under: float
 ) -> DecisiveTruth:
     """Distances to the scene and between own links, as `Truth` has them, where they decide.
 

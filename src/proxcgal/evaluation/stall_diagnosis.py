@@ -6,17 +6,15 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from proxcgal.core.modes import HOLD
 from proxcgal.core.transforms import inverse
+from proxcgal.core.typing import Array
 from proxcgal.evaluation.termination import Ending, Holding, pose_errors
 from proxcgal.models.macro_micro import tool_jacobian
 from proxcgal.scenario.setup import Setup
 from proxcgal.sim.tick import TickResult
 
-Array = NDArray[np.float64]
-
-_HELD = 2  # modes from here on: HOLD, STOP
 _SETTLED = 80  # ticks at one posture after which a command has reached what it wants
 _FREES = 0.01  # [m/s] or [rad/s] towards the goal: less is no way out
 
@@ -77,7 +75,7 @@ def concluded(
     holding = what_holds(setup, q, points_W, last, time)
     metres, radians = pose_errors(np.asarray(setup.robot.tool_pose(q)), setup.goal)
     words = [f"{holding}", f"{ending.reason}, {metres:.3f} m and {radians:.3f} rad remain"]
-    if last.mode >= _HELD:
+    if last.mode >= HOLD:
         found = ", ".join(sorted({finding.reason for finding in last.findings}))
         words.insert(1, f"the monitor holds the arm: {found or 'it is not clear yet'}")
     return replace(ending, reason="; ".join(words), holding=holding)

@@ -6,11 +6,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from proxcgal.core.typing import Array
 from proxcgal.scenario.joint import Finish
-
-Array = NDArray[np.float64]
 
 Outcome = Literal["succeeded", "aborted", "cancelled"]
 

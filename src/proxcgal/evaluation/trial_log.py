@@ -11,12 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from proxcgal.core.typing import Array, Bools
 from proxcgal.evaluation.coverage import NO_COVERAGE, Coverage, Sighting
 from proxcgal.evaluation.termination import Ending
 from proxcgal.models import Robot
 from proxcgal.sim.tick import TaskResult, Tick, TickResult
-
-Array = NDArray[np.float64]
 
 NOTHING = 9.99  #: [m] stands for the distance to nothing
 TOO_CLOSE = 0.05  #: [m] a true distance under it is a violation
@@ -47,7 +46,7 @@ class TrialLog:
     tool_W: Array  #: (n, 3)
     goal_error_m: Array  #: (n,)
     goal_angle_rad: Array  #: (n,)
-    mode: NDArray[np.int64]  #: (n,) 0 RUN, 1 DEGRADED, 2 HOLD, 3 STOP
+    mode: NDArray[np.int64]  #: (n,) as in core.modes
     cloud_points: NDArray[np.int64]  #: (n,) that the filter kept
     leaked_points: NDArray[np.int64]  #: (n,) of those, how many really are the robot itself
     findings: dict[str, int]  #: in how many ticks each reason was found
@@ -158,12 +157,12 @@ def _tasks(results: Sequence[TickResult]) -> dict[str, Any]:
     }
 
 
-def final_ticks(elapsed: Array) -> NDArray[np.bool_]:
+def final_ticks(elapsed: Array) -> Bools:
     """(n,) true for the ticks that `true_final_m` is the mean of; `elapsed` as in the log."""
     return elapsed >= elapsed[-1:] - FINAL if len(elapsed) else np.zeros(0, bool)
 
 
-def sampled_ticks(elapsed: Array, hz: float) -> NDArray[np.bool_]:
+def sampled_ticks(elapsed: Array, hz: float) -> Bools:
     """(n,) true for the first tick of every period, from the first tick on; 0 Hz: for none."""
     beats = np.floor(elapsed * hz + 1e-9)
     return np.diff(beats, prepend=-1.0 if hz > 0.0 else 0.0) > 0.0

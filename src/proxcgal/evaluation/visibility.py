@@ -5,15 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from proxcgal.core.typing import Array, Bools
 from proxcgal.sim.world import World
 
 if TYPE_CHECKING:
     from proxcgal.scenario.setup import Setup
     from proxcgal.scene.obstacles import Scene
-
-Array = NDArray[np.float64]
 
 _BEFORE_M = 0.005  # a ray that ends so little before a point on a surface has reached it
 
@@ -38,7 +36,7 @@ class Eyes:
         self._near, self._far, self._reach = sensor.min_range, sensor.max_range, sensor.workspace
         self._mounting = setup.scenario.simulation.mounting
 
-    def see(self, q: Array, points_W: Array, time: float = 0.0) -> NDArray[np.bool_]:
+    def see(self, q: Array, points_W: Array, time: float = 0.0) -> Bools:
         """(n,) true where any sensor has the point (n, 3) in view at a posture.
 
         Args:

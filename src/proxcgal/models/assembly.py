@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from proxcgal.core.errors import GeometryError, ModelError
+from proxcgal.core.typing import Array, Ints
 from proxcgal.models.joining import joined, rigid
 from proxcgal.models.mesh.files import check_mesh, clean, load_mesh
 from proxcgal.models.mesh.resolution import ControlMesh, check_resolution, control_mesh
-from proxcgal.models.mesh.triangles import Floats, Ints
 from proxcgal.models.robots import Robot
 
 Mesh = str | os.PathLike[str] | tuple[ArrayLike, ArrayLike]
@@ -100,7 +100,7 @@ def attach_mesh(
     return Robot(replace(robot.description, links=tuple(links)), control)
 
 
-def _triangles_of(mesh: Mesh) -> tuple[Floats, Ints, int]:
+def _triangles_of(mesh: Mesh) -> tuple[Array, Ints, int]:
     if isinstance(mesh, str | os.PathLike):
         return clean(*load_mesh(mesh), str(mesh))
     try:
@@ -116,5 +116,5 @@ def _triangles_of(mesh: Mesh) -> tuple[Floats, Ints, int]:
     return clean(points, triangles, "mesh")
 
 
-def _joined(v: Floats, f: Ints, w: Floats, g: Ints) -> tuple[Floats, Ints]:
+def _joined(v: Array, f: Ints, w: Array, g: Ints) -> tuple[Array, Ints]:
     return np.concatenate([v, w]), np.concatenate([f, g + len(v)]).astype(np.int32)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from proxcgal._core import Capsule, LinkCapsule
-from proxcgal.models.mesh.triangles import Floats, Ints
+from proxcgal.core.typing import Array, Ints
 
 if TYPE_CHECKING:
     from proxcgal.models.robots import Robot
@@ -18,7 +18,7 @@ _TINY = 1e-300  # stands in for the square of no length
 _STEPS = (0.3, 0.1, 0.03, 0.01, 0.003, 0.001)  # of the search: share of the mesh's size, and [rad]
 
 
-def capsule_mesh(start: Floats, end: Floats, radius: float) -> tuple[Floats, Ints]:
+def capsule_mesh(start: Array, end: Array, radius: float) -> tuple[Array, Ints]:
     """A closed surface of a capsule: vertices (v, 3) [m], all on it, and triangles (f, 3)."""
     frame = _frame(end - start)
     latitude = np.linspace(0.0, np.pi / 2, RINGS + 1)[:-1]
@@ -62,7 +62,7 @@ def fit_capsules(robot: Robot) -> list[LinkCapsule]:
     ]
 
 
-def fit_capsule(vertices: Floats) -> Capsule:
+def fit_capsule(vertices: Array) -> Capsule:
     """A small capsule that contains these points, and with them every triangle between them.
 
     Searched from the principal axes by small turns and shifts of the axis: it need not be the
@@ -86,10 +86,10 @@ def fit_capsule(vertices: Floats) -> Capsule:
     return Capsule(start, end, float(apart.max()) + _ROUNDING)
 
 
-_Fit = tuple[float, Floats, Floats, float]
+_Fit = tuple[float, Array, Array, float]
 
 
-def _improved(points: Floats, middle: Floats, axis: Floats, size: float) -> _Fit:
+def _improved(points: Array, middle: Array, axis: Array, size: float) -> _Fit:
     """The least volume that turning and shifting this axis leads to."""
     best = _around(points, middle, axis)
     for step in _STEPS:
@@ -107,7 +107,7 @@ def _improved(points: Floats, middle: Floats, axis: Floats, size: float) -> _Fit
     return best
 
 
-def _around(points: Floats, middle: Floats, axis: Floats) -> _Fit:
+def _around(points: Array, middle: Array, axis: Array) -> _Fit:
     """The least capsule on this line that contains the points, its volume first."""
     axis = axis / np.linalg.norm(axis)
     along = (points - middle) @ axis
@@ -122,7 +122,7 @@ def _around(points: Floats, middle: Floats, axis: Floats) -> _Fit:
     return volume, middle + low * axis, middle + high * axis, radius
 
 
-def _frame(axis: Floats) -> Floats:
+def _frame(axis: Array) -> Array:
     """(3, 3) rows of a right-handed frame, the last along the axis; upright for none."""
     length = np.linalg.norm(axis)
     z = axis / length if length > 0 else np.array([0.0, 0.0, 1.0])

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Literal
 
 from proxcgal.core.errors import ModelError
-from proxcgal.models.mesh.triangles import Floats, Ints
+from proxcgal.core.typing import Array, Ints
 
 JointType = Literal["revolute", "prismatic"]
 
@@ -20,8 +20,8 @@ class Joint:
     name: str
     type: JointType
     parent: int  # row of the joint it hangs on, -1 for the base
-    origin: Floats  # (4, 4) joint frame at q = 0 in the parent joint's frame
-    axis: Floats  # (3,) unit, in the joint frame
+    origin: Array  # (4, 4) joint frame at q = 0 in the parent joint's frame
+    axis: Array  # (3,) unit, in the joint frame
     q_min: float  # [rad] or [m]
     q_max: float  # [rad] or [m]
     qd_max: float  # [rad/s] or [m/s]; nan where the description gives none
@@ -34,8 +34,8 @@ class Link:
 
     name: str
     joint: int  # the joint that moves it, -1 for the base
-    T_JL: Floats  # (4, 4) link frame in that joint's frame
-    vertices_L: Floats  # (v, 3) [m]
+    T_JL: Array  # (4, 4) link frame in that joint's frame
+    vertices_L: Array  # (v, 3) [m]
     triangles: Ints  # (f, 3)
     dropped_faces: int = 0  # faces without area, left out
 
@@ -46,7 +46,7 @@ class Frame:
 
     name: str
     joint: int  # the joint that moves it, -1 for the base
-    T_JF: Floats  # (4, 4) in that joint's frame
+    T_JF: Array  # (4, 4) in that joint's frame
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from proxcgal.core.errors import ModelError
+from proxcgal.core.typing import Array
 from proxcgal.models.description import Frame, Joint, Link, RobotDescription, listed
-from proxcgal.models.mesh.triangles import Floats
 
 
 def joined(
@@ -66,7 +66,7 @@ def joined(
     return one, order
 
 
-def rigid(pose: ArrayLike, what: str) -> Floats:
+def rigid(pose: ArrayLike, what: str) -> Array:
     """A (4, 4) rigid pose.
 
     Raises:
@@ -102,13 +102,13 @@ def renamed(description: RobotDescription, prefix: str) -> RobotDescription:
     )
 
 
-def moved(description: RobotDescription, T_JB: Floats, joint: int, offset: int) -> RobotDescription:
+def moved(description: RobotDescription, T_JB: Array, joint: int, offset: int) -> RobotDescription:
     """The robot hung on a joint of another: its rows shifted by `offset`, its base at T_JB."""
 
     def row(own: int) -> int:
         return joint if own < 0 else own + offset
 
-    def placed(own: int, pose: Floats) -> Floats:
+    def placed(own: int, pose: Array) -> Array:
         return T_JB @ pose if own < 0 else pose
 
     joints: list[Joint] = [

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from proxcgal.core.errors import ModelError
+from proxcgal.core.typing import Array
 from proxcgal.models.description import Joint, RobotDescription, listed
-from proxcgal.models.mesh.triangles import Floats
 
 PerJoint = float | Sequence[float] | Mapping[str, float]
 
@@ -103,7 +103,7 @@ def with_limits(
     return replace(description, joints=tuple(joints))
 
 
-def _numbers(value: object, what: str) -> Floats:
+def _numbers(value: object, what: str) -> Array:
     """(n,) of one number or a list of them."""
     try:
         return np.atleast_1d(np.asarray(value, dtype=np.float64)).ravel()

@@ -6,17 +6,15 @@ from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxcgal import _core
 from proxcgal.core.cache import Cache, Stored
 from proxcgal.core.errors import ConfigError
+from proxcgal.core.typing import Array
 from proxcgal.models.surfaces import Surfaces
 
 if TYPE_CHECKING:
     from proxcgal.models.robots import Robot
-
-Array = NDArray[np.float64]
 
 _POSTURES = 4000
 _SAMPLES, _FEW_JOINTS = 1000, 3

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from proxcgal import _core
 from proxcgal.core.errors import ConfigError
-from proxcgal.models.mesh.triangles import Floats
+from proxcgal.core.typing import Array
 from proxcgal.models.robots import Robot
 from proxcgal.models.self_view import Body, View
 
@@ -125,7 +125,7 @@ def check_mounts(
     return MountChecks(sensors=tuple(checks))
 
 
-def _measured(skin: _core.Skin, scans: Iterable[_core.Scan]) -> tuple[Floats, Floats]:
+def _measured(skin: _core.Skin, scans: Iterable[_core.Scan]) -> tuple[Array, Array]:
     """Mean range along z of each sensor's zones, (n, 64), and its sigma.
 
     The range is nan where too few scans tell, inf where they say that nothing is there.
@@ -150,7 +150,7 @@ def _measured(skin: _core.Skin, scans: Iterable[_core.Scan]) -> tuple[Floats, Fl
 
 
 def _check(
-    row: int, name: str, view: View, model: _core.SensorModel, ranges: Floats, sigma: Floats
+    row: int, name: str, view: View, model: _core.SensorModel, ranges: Array, sigma: Array
 ) -> MountCheck:
     zones, predicted, slopes = _smooth(view, np.zeros(6), np.arange(64))
     noise = np.maximum(model.sigma_floor, model.sigma_ratio * predicted)
@@ -174,11 +174,11 @@ class _Expected:
     """What a sensor must see of the body where its mount is right."""
 
     zones: NDArray[np.intp]  # (n,)
-    predicted: Floats  # (n,) ranges [m]
-    slopes: Floats  # (n, 6) how they change with the mount
-    sigma: Floats  # (n,) of the measured means [m]
+    predicted: Array  # (n,) ranges [m]
+    slopes: Array  # (n, 6) how they change with the mount
+    sigma: Array  # (n,) of the measured means [m]
 
-    def judge(self, ranges: Floats) -> tuple[float, NDArray[np.intp], int]:
+    def judge(self, ranges: Array) -> tuple[float, NDArray[np.intp], int]:
         """Score of the ranges (64,) against a right mount, zones it rests on, zones of a gap."""
         missing = ranges[self.zones] - self.predicted
         # Nothing can hide the body by being farther away than it: there the body is not.
@@ -208,8 +208,8 @@ def _visible(view: View, seen: _Expected) -> tuple[str, ...]:
 
 
 def _smooth(
-    view: View, at: Floats, zones: NDArray[np.intp]
-) -> tuple[NDArray[np.intp], Floats, Floats]:
+    view: View, at: Array, zones: NDArray[np.intp]
+) -> tuple[NDArray[np.intp], Array, Array]:
     """Zones that see one smooth piece of the body; their ranges; how these move with the mount."""
     seen = view(at[None], zones)[0]
     zones, seen = zones[np.isfinite(seen)], seen[np.isfinite(seen)]
@@ -226,9 +226,9 @@ def _smooth(
     return zones[smooth], seen[smooth], slopes[smooth]
 
 
-def _fitted(view: View, zones: NDArray[np.intp], ranges: Floats, sigma: Floats) -> Floats:
+def _fitted(view: View, zones: NDArray[np.intp], ranges: Array, sigma: Array) -> Array:
     """Where the mount must be for what was seen, as near to where it should be as that allows."""
-    at: Floats = np.zeros(6)
+    at: Array = np.zeros(6)
     for _ in range(_ROUNDS):
         chosen, seen, slopes = _smooth(view, at, zones)
         if not chosen.size:

@@ -17,6 +17,7 @@ import numpy as np
 from proxcgal import _core
 from proxcgal.core.cache import hash_mesh
 from proxcgal.core.errors import ConfigError, ModelError, ModelWarning
+from proxcgal.core.typing import Array, Ints
 from proxcgal.models.builtin import BUILTIN, list_robots
 from proxcgal.models.description import RobotDescription, listed
 from proxcgal.models.formats.load import read_description
@@ -28,7 +29,6 @@ from proxcgal.models.mesh.resolution import (
     check_resolution,
     control_mesh,
 )
-from proxcgal.models.mesh.triangles import Floats, Ints
 
 __all__ = ["Robot", "list_robots", "load_robot"]
 
@@ -74,7 +74,7 @@ class Robot(_core.Robot):
         """The file that the robot was read from."""
         return self._description.source
 
-    def full_mesh(self, link: str) -> tuple[Floats, Ints]:
+    def full_mesh(self, link: str) -> tuple[Array, Ints]:
         """The link's mesh at full resolution: vertices_L (v, 3) [m] and triangles (f, 3).
 
         Raises:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxcgal import _core
-from proxcgal.models.mesh.triangles import Floats
+from proxcgal.core.typing import Array
 from proxcgal.models.robots import Robot
 
 _MOUNTING = 0.005  # [m] of each ray, as `filter.min_hit`
@@ -16,7 +16,7 @@ _known: dict[str, list[_core.MeshTree]] = {}
 class Body:
     """The links' full surfaces at one posture."""
 
-    def __init__(self, robot: Robot, poses_W: Floats) -> None:
+    def __init__(self, robot: Robot, poses_W: Array) -> None:
         """Args: `poses_W` (n_links, 4, 4) T_WL."""
         self.poses_W = poses_W
         self._trees = _trees(robot)
@@ -26,7 +26,7 @@ class Body:
         self._centres = np.array([(low + high) / 2 for low, high in boxes])
         self._radii = np.array([np.linalg.norm(high - low) / 2 for low, high in boxes])
 
-    def cast(self, origins_W: Floats, rays_W: Floats) -> Floats:
+    def cast(self, origins_W: Array, rays_W: Array) -> Array:
         """(n,) length to the first surface, past the sensor's own mounting; inf for none."""
         length = np.full(len(origins_W), np.inf)
         start = origins_W + _MOUNTING * rays_W
@@ -55,7 +55,7 @@ def _trees(robot: Robot) -> list[_core.MeshTree]:
 class View:
     """What one sensor must see from a mount moved by a little, as ranges along its z."""
 
-    def __init__(self, body: Body, model: _core.SensorModel, T_WS: Floats) -> None:
+    def __init__(self, body: Body, model: _core.SensorModel, T_WS: Array) -> None:
         """Args: `T_WS` (4, 4) where the sensor must be."""
         self._body = body
         rays = np.asarray(_core.zone_directions(model))
@@ -64,7 +64,7 @@ class View:
         self._z_per_length = 1.0 / length
         self._T_WS = T_WS
 
-    def __call__(self, moved: Floats, zones: NDArray[np.intp]) -> Floats:
+    def __call__(self, moved: Array, zones: NDArray[np.intp]) -> Array:
         """Ranges (k, len(zones)) from mounts moved by (k, 6): shift [m], turn [rad], in S."""
         turns = np.array([rotation_by(turn) for turn in moved[:, 3:]])
         R_WS = self._T_WS[:3, :3] @ turns
@@ -72,16 +72,16 @@ class View:
         rays = self._rays_S[zones] @ np.swapaxes(R_WS, 1, 2)
         starts = np.broadcast_to(origins[:, None, :], rays.shape)
         lengths = self._body.cast(starts.reshape(-1, 3), rays.reshape(-1, 3))
-        ranges: Floats = lengths.reshape(len(moved), len(zones)) * self._z_per_length[zones]
+        ranges: Array = lengths.reshape(len(moved), len(zones)) * self._z_per_length[zones]
         return ranges
 
 
-def rotation_by(turn: Floats) -> Floats:
+def rotation_by(turn: Array) -> Array:
     """(3, 3) of a rotation vector [rad]."""
     angle = float(np.linalg.norm(turn))
     if angle == 0.0:
         return np.eye(3)
     x, y, z = turn / angle
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    rotation: Floats = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+    rotation: Array = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
     return rotation

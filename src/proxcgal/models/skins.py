@@ -9,8 +9,9 @@ import numpy as np
 
 from proxcgal import _core
 from proxcgal.core.errors import ConfigError, GeometryError, ModelError
+from proxcgal.core.typing import Array, Ints
 from proxcgal.models.mesh.files import FARTHEST
-from proxcgal.models.mesh.triangles import Floats, Ints, is_number
+from proxcgal.models.mesh.triangles import is_number
 from proxcgal.models.robots import Robot
 
 _AXES = ("x", "y", "z")
@@ -100,8 +101,8 @@ def ring_skin(
 
 
 def _axis(
-    robot: Robot, link: str, vertices: Floats, wanted: str | None
-) -> tuple[Floats, Floats, float]:
+    robot: Robot, link: str, vertices: Array, wanted: str | None
+) -> tuple[Array, Array, float]:
     """Where the link begins (3,) [m], its unit axis away from there, and its length [m]."""
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     short, middle, k = np.argsort(high - low)
@@ -123,7 +124,7 @@ def _axis(
     return begin, axis, float(high[k] - low[k])
 
 
-def _reference(robot: Robot, link: str, axis: Floats) -> Floats:
+def _reference(robot: Robot, link: str, axis: Array) -> Array:
     """Unit direction of angle 0, across the link's axis: that of the joint that moves it."""
     found = robot.description.links[robot.description.link_row(link)]
     choices = [np.roll(axis, 1)]
@@ -138,8 +139,8 @@ def _reference(robot: Robot, link: str, axis: Floats) -> Floats:
 
 
 def _centre(
-    vertices: Floats, triangles: Ints, axis: Floats, across: Floats, height: float, what: str
-) -> Floats:
+    vertices: Array, triangles: Ints, axis: Array, across: Array, height: float, what: str
+) -> Array:
     """Centre (3,) of the link's outline in the plane axis . x = height: middle of its extent."""
     up = vertices @ axis - height
     side = up[triangles]
@@ -159,8 +160,8 @@ def _centre(
 
 
 def _outer_radius(
-    tree: _core.MeshTree, vertices: Floats, centre: Floats, outward: Floats, what: str
-) -> Floats:
+    tree: _core.MeshTree, vertices: Array, centre: Array, outward: Array, what: str
+) -> Array:
     """Distance (n,) from the centre to the outermost surface in each direction [m]."""
     reach = float(np.linalg.norm(vertices - centre, axis=1).max()) + 0.1
     hit = tree.first_hit(centre + reach * outward, -outward)

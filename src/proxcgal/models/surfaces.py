@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 from proxcgal import _core
 from proxcgal.core.cache import Cache, Stored
 from proxcgal.core.transforms import inverse
+from proxcgal.core.typing import Array, Bools
 
 if TYPE_CHECKING:
     from proxcgal.models.robots import Robot
-
-Array = NDArray[np.float64]
 
 #: Links nearer than this in every random posture are built that way [m].
 ALWAYS_NEAR = 0.05
@@ -86,7 +85,7 @@ class Surfaces:
         return np.hstack([centers, (R * radii / np.sqrt(2.0)).reshape(-1, 9)])
 
     @staticmethod
-    def _joints_between(moves: NDArray[np.bool_], a: int, b: int) -> int:
+    def _joints_between(moves: Bools, a: int, b: int) -> int:
         """How many joints move one of two links and not the other; neighbours have one."""
         return int((moves[a] != moves[b]).sum())
 

@@ -12,11 +12,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from proxcgal.core.typing import Array
 from proxcgal.scene.solids import Box, Cylinder, Solid, Sphere
 
-Array = NDArray[np.float64]
 Schema = dict[str, Any]
 
 WORLD = "world"

@@ -12,6 +12,7 @@ from PIL import Image
 
 from proxcgal.core.errors import ConfigError
 from proxcgal.core.transforms import inverse, placed
+from proxcgal.core.typing import Array
 from proxcgal.recording.reader import Recording
 from proxcgal.recording.replay import Replay
 from proxcgal.scenario.setup import Setup
@@ -19,7 +20,6 @@ from proxcgal.sim.moment import without
 from proxcgal.sim.tick import Tick
 from proxcgal.sim.world import Arrow, Camera, Color, Spheres, World
 
-Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 
 _FILTERED: Color = (0.80, 0.05, 0.10, 1.0)

@@ -17,17 +17,15 @@ from typing import IO, BinaryIO, Literal, cast
 
 import numpy as np
 from mcap.writer import CompressionType, IndexType, Writer
-from numpy.typing import NDArray
 
 from proxcgal.core.closing import Closing
 from proxcgal.core.errors import ConfigError
+from proxcgal.core.typing import Array
 from proxcgal.core.versions import versions
 from proxcgal.recording import codec, foxglove
 from proxcgal.scenario.loading import Scenario
 from proxcgal.scene.obstacles import Scene
 from proxcgal.sim.tick import Tick
-
-Array = NDArray[np.float64]
 
 #: Every tick, which a replay repeats bit for bit; or, to step through, those that brought scans.
 RecordedTicks = Literal["all", "scans"]

@@ -10,12 +10,11 @@ import math
 from itertools import pairwise
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from proxcgal import _core
 from proxcgal.core import transforms
+from proxcgal.core.typing import Array
 from proxcgal.scene.solids import Box, Capsule, Cylinder, Solid, Sphere
 
 FaultKind = Literal[
@@ -278,7 +277,7 @@ class Obstacle(Section):
                 return Capsule(*self.size)
         return Sphere(*self.size)
 
-    def pose(self) -> NDArray[np.float64]:
+    def pose(self) -> Array:
         """(4, 4) T_WO of its centre, at the start."""
         return transforms.pose(self.position, self.rpy)
 

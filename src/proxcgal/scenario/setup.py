@@ -7,18 +7,16 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxcgal import _core
 from proxcgal.core import transforms
 from proxcgal.core.errors import ConfigError
+from proxcgal.core.typing import Array
 from proxcgal.models import Robot, load_robot, macro_micro, ring_skin
 from proxcgal.scenario.controller import Controller
 from proxcgal.scenario.keys import Section
 from proxcgal.scenario.loading import CONTROLLERS, Scenario
 from proxcgal.scene.obstacles import KnownCloud, Scene
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

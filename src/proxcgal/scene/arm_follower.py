@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from proxcgal.core.typing import Array
 from proxcgal.scene.solids import Capsule, Solid
-
-Array = NDArray[np.float64]
 
 _STRETCHED = 0.999  # of both lengths: an arm is never quite straight
 

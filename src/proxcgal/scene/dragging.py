@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from proxcgal.core.typing import Array
 from proxcgal.scene.arm_follower import arms
 from proxcgal.scene.obstacles import Scene
 from proxcgal.scene.solids import Solid
-
-Array = NDArray[np.float64]
 
 SPEED = 1.0  #: [m/s] at most, of a solid that a hand moves
 

@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxcgal.core.transforms import placed
+from proxcgal.core.typing import Array
 from proxcgal.scene.solids import Solid
 
 if TYPE_CHECKING:
     from proxcgal.scenario.keys import Obstacle
-
-Array = NDArray[np.float64]
 
 
 class Scene(Protocol):

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from proxcgal.core.typing import Array
+
 Mesh = tuple[Array, NDArray[np.int32]]  # vertices_O (v, 3), triangles (f, 3)
 
 #: Corner k of the unit cube has the bits of k as coordinates; two triangles a face, outward.

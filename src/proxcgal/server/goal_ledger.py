@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from proxcgal.core.typing import Array
 from proxcgal.evaluation.termination import Outcome
 from proxcgal.server.goals import (
     AT_REST,
@@ -18,8 +18,6 @@ from proxcgal.server.goals import (
     State,
 )
 from proxcgal.sim.tick import TickResult
-
-Array = NDArray[np.float64]
 
 CANCELLED = "cancelled by the client"
 _AT_BOUND = 0.9  # share of an acceleration limit from which a joint is at it

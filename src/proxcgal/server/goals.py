@@ -11,15 +11,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxcgal.core import transforms
 from proxcgal.core.errors import ProxError
+from proxcgal.core.typing import Array
 from proxcgal.evaluation.termination import Outcome
 from proxcgal.models import Robot
 from proxcgal.scenario.setup import posture_problems
 
-Array = NDArray[np.float64]
 State = Literal["starting", "executing", "cancelling", "succeeded", "aborted", "cancelled"]
 
 BASE, END_EFFECTOR = FRAMES = ("kuka_base", "end_effector")

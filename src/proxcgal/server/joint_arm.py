@@ -6,19 +6,16 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxcgal import _core
+from proxcgal.core.modes import STOP
+from proxcgal.core.typing import Array
 from proxcgal.models import Robot
 from proxcgal.models.macro_micro import tool_jacobian
 from proxcgal.scenario.joint import JointScenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.server.goals import AT_REST
 from proxcgal.sim.tick import Tick, TickInput, TickResult, TickTruth
-
-Array = NDArray[np.float64]
-
-_STOP = int(_core.Mode.STOP.value)
 
 
 class JointArm:
@@ -71,7 +68,7 @@ class JointArm:
     @property
     def stopped(self) -> bool:
         """Has the monitor stopped it, until a reset?"""
-        return self.last is not None and self.last.mode == _STOP
+        return self.last is not None and self.last.mode == STOP
 
     @property
     def findings(self) -> str:

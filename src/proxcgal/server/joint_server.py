@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxcgal.core.closing import Closing
 from proxcgal.core.errors import ConfigError
+from proxcgal.core.typing import Array
 from proxcgal.models import Robot
 from proxcgal.scenario.joint import JointScenario
 from proxcgal.scenario.loading import load_scenario
@@ -34,8 +34,6 @@ from proxcgal.server.goals import (
 )
 from proxcgal.server.joint_arm import JointArm
 from proxcgal.server.pursuit import JointPursuit, PursuedGoal
-
-Array = NDArray[np.float64]
 
 
 class JointRobotServer(Closing):

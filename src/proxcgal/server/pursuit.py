@@ -6,16 +6,14 @@ import threading
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxcgal.core.errors import ProxError
+from proxcgal.core.typing import Array
 from proxcgal.evaluation.stall_diagnosis import concluded
 from proxcgal.evaluation.termination import Ending, GoalWatch, Outcome, pose_errors
 from proxcgal.server.goal_ledger import GoalLedger, Pursued
 from proxcgal.server.goals import JointGoal, goal_pose
 from proxcgal.server.joint_arm import JointArm
-
-Array = NDArray[np.float64]
 
 
 @dataclass(slots=True, kw_only=True)

@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxcgal import _core
+from proxcgal.core.typing import Array
 from proxcgal.scenario.setup import Setup
 from proxcgal.sim.tick import TickInput, TickResult
 
-Array = NDArray[np.float64]
 Points = NDArray[np.float32]
 
-MODES = ("RUN", "DEGRADED", "HOLD", "STOP")
 _NOTHING = 9.0  # [m] as far as that is nothing
 
 
@@ -56,7 +55,7 @@ class Moment(Posed):
     seen: float  #: [m] cloud to robot
     true: float  #: [m] scene to robot
     activation: float  #: of avoidance
-    mode: int  #: row of MODES
+    mode: int  #: as in core.modes
     found: tuple[str, ...]  #: reasons of the findings
     tick_us: float  #: wall time of the tick
     qd: Array  #: (n_q,) commanded

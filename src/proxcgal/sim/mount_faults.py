@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxcgal import _core
 from proxcgal.core.errors import ConfigError
+from proxcgal.core.typing import Array
 from proxcgal.models.mount_check import MountChecks, check_mounts
 from proxcgal.models.self_view import rotation_by
 from proxcgal.scenario.keys import MOUNT_FAULTS, Fault
@@ -18,8 +18,6 @@ from proxcgal.sim.faults import rows_of, value_of
 if TYPE_CHECKING:
     from proxcgal.scenario.setup import Setup
     from proxcgal.sim.source import SimulatedSource
-
-Array = NDArray[np.float64]
 
 SCANS = 30  #: of each sensor before a run: 2 s at 15 Hz
 _STREAM = 3  # of the seed; noise and other faults draw from others

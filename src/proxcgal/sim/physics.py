@@ -13,12 +13,10 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from proxcgal.core.errors import ConfigError, SimulationError
+from proxcgal.core.typing import Array
 from proxcgal.models.formats.capsule_robot import CapsuleRobot
-
-Array = NDArray[np.float64]
 
 #: Stiff, so that a held arm does not creep: MuJoCo's own friction gives way by a hundredth of the
 #: load's acceleration, which would be 0.3 deg/s here.

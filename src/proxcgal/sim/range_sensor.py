@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxcgal import _core
+from proxcgal.core.typing import Array
 from proxcgal.scenario.keys import Sensor, Simulation
-
-Array = NDArray[np.float64]
 
 ZONES = 64
 VALID, NO_TARGET, UNCERTAIN = 5, 255, (6, 9)

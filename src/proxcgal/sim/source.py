@@ -6,18 +6,15 @@ from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxcgal import _core
+from proxcgal.core.typing import Array, Bools
 from proxcgal.scenario.setup import Setup
 from proxcgal.sim.mount_faults import RealMounts
 from proxcgal.sim.range_sensor import ZONES, RangeModel
 from proxcgal.sim.tick import TickInput
 from proxcgal.sim.waypoints import Errand
 from proxcgal.sim.world import Hits, World
-
-Array = NDArray[np.float64]
-
 
 _BEFORE = 1 << 20  # index of the scans before the run: their noise is none of the run's
 
@@ -78,7 +75,7 @@ class SimulatedSource:
         self._links = np.array([links.index(mount.link) for mount in mounts], np.intp)
         self._mounts = RealMounts(mounts, setup.scenario.faults, seed)
         #: (sensors, 64) true where the last scan really saw the robot itself.
-        self.saw_robot: NDArray[np.bool_] = np.zeros((sensors, ZONES), bool)
+        self.saw_robot: Bools = np.zeros((sensors, ZONES), bool)
 
     @property
     def q(self) -> Array:

@@ -6,17 +6,15 @@ from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxcgal import _core
+from proxcgal.core.typing import Array, Bools
 from proxcgal.scenario.loading import Scenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.sim.range_sensor import ZONES
 from proxcgal.sim.source import SimulatedSource
 from proxcgal.sim.tick import TickInput
 from proxcgal.sim.world import World
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,7 +26,7 @@ class Snapshot:
     origins_W: Array  #: (n, 3) [m] emitter of each point
     points_W: Array  #: (n, 3) [m] all that was sensed, the robot itself included
     tolerance: Array  #: (n,) [m] epsilon of the filter: grows with the range's noise
-    environment: NDArray[np.bool_]  #: (n,) true where the filter keeps the point
+    environment: Bools  #: (n,) true where the filter keeps the point
 
     def within(self, reach: float) -> Self:
         """The same without the points whose ray is longer than that [m]."""
@@ -78,7 +76,7 @@ def take_snapshot(scenario: Scenario, scans: int = 1) -> Snapshot:
     )
 
 
-def _placed(setup: Setup, given: TickInput, kept: NDArray[np.bool_]) -> Snapshot:
+def _placed(setup: Setup, given: TickInput, kept: Bools) -> Snapshot:
     """One scan of every sensor: what the core's sense stage makes of it, emitters beside."""
     settings, model = setup.scenario.controller.filter, setup.skin.model
     poses_W = np.asarray(setup.robot.link_poses(given.q))

@@ -8,11 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxcgal import _core
-
-Array = NDArray[np.float64]
+from proxcgal.core.typing import Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +53,7 @@ class TickResult:
     """What a tick answered."""
 
     qd: Array  #: (n_q,)
-    mode: int  #: 0 RUN, 1 DEGRADED, 2 HOLD, 3 STOP
+    mode: int  #: as in core.modes
     seen: float = np.inf  #: [m] closest pair between cloud and robot
     link: str = ""  #: that pair's link on the robot
     surface_W: tuple[float, ...] | None = None  #: (3,) [m] that pair's point on the robot

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxcgal.core.errors import SimulationError
+from proxcgal.core.typing import Array, Bools
 from proxcgal.models.surfaces import Surfaces
 from proxcgal.scene.solids import Box, Capsule, Cylinder, Solid, Sphere
 
@@ -46,8 +47,6 @@ import mujoco  # noqa: E402
 if TYPE_CHECKING:
     from proxcgal.models.robots import Robot
     from proxcgal.scene.obstacles import Scene
-
-Array = NDArray[np.float64]
 
 Color = tuple[float, float, float, float]
 
@@ -99,7 +98,7 @@ class Hits:
     """First surfaces along rays."""
 
     length: Array  #: (k, n) [m] along the ray, inf where nothing is hit
-    robot: NDArray[np.bool_]  #: (k, n) true where the robot itself is hit
+    robot: Bools  #: (k, n) true where the robot itself is hit
 
 
 class World:

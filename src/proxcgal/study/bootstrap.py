@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from proxcgal.core.typing import Array
 
 RESAMPLES = 10_000
 CONFIDENCE = 0.95
@@ -34,8 +35,8 @@ class RatioInterval:
 
 
 def ratio_interval(
-    above: Sequence[float] | NDArray[np.float64],
-    below: Sequence[float] | NDArray[np.float64],
+    above: Sequence[float] | Array,
+    below: Sequence[float] | Array,
     seed: int = 0,
 ) -> RatioInterval:
     """sum(above) / sum(below) over pairs, and its 95 % percentile bootstrap interval.

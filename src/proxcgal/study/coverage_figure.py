@@ -10,9 +10,9 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from numpy.typing import NDArray
 
 from proxcgal.core.transforms import placed
+from proxcgal.core.typing import Array
 from proxcgal.evaluation.blind_volume import REACH_M, BlindVolume, distances, last_seen
 from proxcgal.study.figures import DPI, GREY, LEGEND
 
@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from proxcgal.scenario.setup import Setup
-
-Array = NDArray[np.float64]
 
 _STEP_M = 0.025  # between the points of a section
 _ARM = "#6B6B6B"

@@ -15,6 +15,9 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from proxcgal.core import modes
+from proxcgal.core.typing import Array
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
@@ -33,7 +36,7 @@ NAMES = {
 BANDS = ("#56B4E9", "#F0E442", "#CC79A7", "#E69F00", "#9BD8C2", "#B9B9E8", "#D9C6A5", "#C7C7C7")
 GREY = "#5A5A5A"
 #: The monitor's modes but RUN, in colours that no controller has.
-MODES = {1: ("DEGRADED", "#F0E442"), 2: ("HOLD", "#CC79A7"), 3: ("STOP", "#333333")}
+MODE_COLOURS = {modes.DEGRADED: "#F0E442", modes.HOLD: "#CC79A7", modes.STOP: "#333333"}
 DASHED: Any = (0, (4, 1.6))
 LEGEND: dict[str, Any] = {"frameon": False, "fontsize": 9, "handlelength": 2.4}
 
@@ -159,7 +162,7 @@ def _order(controller: str) -> float:
     return 2.0 if controller == "wb" else 3.0
 
 
-def _gaps(distance: NDArray[np.float64]) -> NDArray[np.float64]:
+def _gaps(distance: Array) -> Array:
     """Distances to nothing are gaps in the curve."""
     return np.where(np.isfinite(distance), distance, np.nan)
 
@@ -184,12 +187,12 @@ def _modes(ax: Axes, logs: Sequence[TrialLog]) -> list[Patch]:
             if mode > 0:
                 met.add(int(mode))
                 ax.broken_barh(
-                    [(start, end - start)], (row - 0.38, 0.76), facecolors=MODES[int(mode)][1]
+                    [(start, end - start)], (row - 0.38, 0.76), facecolors=MODE_COLOURS[int(mode)]
                 )
     ax.set_yticks(range(len(logs)), [log.controller for log in reversed(logs)])
     ax.set_ylim(-0.6, len(logs) - 0.4)
     ax.set_ylabel("mode", fontsize=10)
-    return [Patch(color=MODES[mode][1], label=MODES[mode][0]) for mode in sorted(met)]
+    return [Patch(color=MODE_COLOURS[mode], label=modes.NAMES[mode]) for mode in sorted(met)]
 
 
 def _links(ax: Axes, logs: Sequence[TrialLog], links: Sequence[str]) -> None:

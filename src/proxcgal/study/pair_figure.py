@@ -9,15 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from proxcgal import _core
+from proxcgal.core.typing import Array
 from proxcgal.study.figures import DPI
 
 if TYPE_CHECKING:
     from proxcgal.models.robots import Robot
-
-Array = NDArray[np.float64]
 
 PAIR_COLOUR = "#C80000"
 ROBOT_SPACING = 0.018  # [m] about, between the points that stand for the arm

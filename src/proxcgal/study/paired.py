@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import polars as pl
-from numpy.typing import NDArray
 
+from proxcgal.core.typing import Array
 from proxcgal.evaluation.metrics import NOTHING_M
 
 Ends = Mapping[str, Mapping[int, float]]
@@ -18,8 +18,8 @@ Ends = Mapping[str, Mapping[int, float]]
 class Pairs:
     """True distances at the end of the draws that both controllers ended, (n,) each [m]."""
 
-    one: NDArray[np.float64]
-    other: NDArray[np.float64]
+    one: Array
+    other: Array
 
     @property
     def apart_mm(self) -> list[float]:

@@ -10,8 +10,9 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from proxcgal.core.modes import STOP
+from proxcgal.core.typing import Array
 from proxcgal.evaluation.ground_truth import Truth
 from proxcgal.models import Robot
 from proxcgal.scenario.loading import Scenario
@@ -27,9 +28,6 @@ from proxcgal.sim.world import World
 from proxcgal.trial.walkthrough.grip import HAND
 from proxcgal.trial.walkthrough.guided import GuidedScenario, GuidedSource
 
-Array = NDArray[np.float64]
-
-STOP = 3  #: the mode that is latched
 _ENDLESS = 1e7  # [s]
 
 

@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxcgal import _core
+from proxcgal.core.typing import Array, Bools
 from proxcgal.evaluation.coverage import coverage_of, sightings
 from proxcgal.evaluation.ground_truth import NOT_ASKED, Truth
 from proxcgal.evaluation.sparse_ground_truth import decisive_truth
@@ -31,7 +31,6 @@ from proxcgal.trial.walkthrough.guided import GuidedScenario, GuidedSource
 
 __all__ = ["CONTROLLERS", "TrialLog", "first_difference", "recompute", "run_trial"]
 
-Array = NDArray[np.float64]
 Progress = Callable[[float], None]
 
 
@@ -139,7 +138,7 @@ def run_trial(
 
 
 def _with_truth(
-    ticks: Sequence[Tick], elapsed: Array, q: Array, setup: Setup, wanted: NDArray[np.bool_]
+    ticks: Sequence[Tick], elapsed: Array, q: Array, setup: Setup, wanted: Bools
 ) -> list[Tick]:
     """The ticks with the true distances that are wanted or decide."""
     asked = decisive_truth(setup.robot, setup.measured, elapsed, q, wanted, under=TOO_CLOSE)

@@ -6,11 +6,9 @@ import threading
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from proxcgal.core.typing import Array
 from proxcgal.viewer.messages import Wishes
-
-Array = NDArray[np.float64]
 
 #: Where a solid may be put, least and most of x, y, z [m].
 ROOM = np.array([[-5.0, -5.0, -1.5], [5.0, 5.0, 4.0]])

@@ -8,8 +8,9 @@ from typing import Any
 
 import viser
 
+from proxcgal.core import modes
 from proxcgal.scenario.loading import CONTROLLERS, Scenario
-from proxcgal.sim.moment import MODES, Moment, metres
+from proxcgal.sim.moment import Moment, metres
 from proxcgal.viewer.access import Gate
 from proxcgal.viewer.choice import (
     BUFFER,
@@ -144,7 +145,7 @@ def _number_of(text: str) -> int:
 def _status(told: Told, moment: Moment, note: str) -> str:
     seen, true = map(metres, (moment.seen, moment.true))
     lines = [
-        f"**{MODES[moment.mode]}** at {moment.elapsed:.1f} s" + pace(told),
+        f"**{modes.NAMES[moment.mode]}** at {moment.elapsed:.1f} s" + pace(told),
         f"seen {seen}, true {true}, activation {moment.activation:.2f}",
         f"moves {moment.link or 'nothing'}",
         f"{len(moment.kept_W)} points kept, {len(moment.removed_W)} removed"

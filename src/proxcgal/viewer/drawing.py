@@ -12,11 +12,11 @@ import viser.transforms
 from numpy.typing import NDArray
 
 from proxcgal.core.transforms import placed
+from proxcgal.core.typing import Array
 from proxcgal.scene.solids import Box, Capsule, Cylinder, Solid, Sphere
 from proxcgal.sim.moment import Posed
 from proxcgal.viewer.scene_model import Stage
 
-Array = NDArray[np.float64]
 Color = tuple[int, int, int]
 
 LINKS: tuple[Color, Color] = ((206, 210, 216), (112, 152, 190))

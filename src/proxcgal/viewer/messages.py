@@ -8,14 +8,10 @@ from collections import deque
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 
-import numpy as np
-from numpy.typing import NDArray
-
+from proxcgal.core.typing import Array
 from proxcgal.sim.moment import Posed
 from proxcgal.viewer.choice import Choice
 from proxcgal.viewer.scene_model import Stage
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

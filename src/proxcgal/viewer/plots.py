@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 import viser
 import viser.uplot
-from numpy.typing import NDArray
 
+from proxcgal.core.typing import Array
 from proxcgal.sim.moment import Moment, Posed
 from proxcgal.viewer.scene_model import Stage
 
-Array = NDArray[np.float64]
 Curve = tuple[str, str, tuple[int, ...]]  # label, colour, dashes [px]
 
 SPAN = 10.0  #: [s]

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import viser
 
-from proxcgal.sim.moment import MODES, Moment, metres
+from proxcgal.core import modes
+from proxcgal.sim.moment import Moment, metres
 from proxcgal.viewer.access import Gate
 from proxcgal.viewer.client_messages import between, one_of, switch
 from proxcgal.viewer.drawing import Drawing, furnish
@@ -143,13 +144,13 @@ class ReplayPage:
 
 
 def _status(moment: Moment, other: Moment | None) -> str:
-    lines = [f"**{MODES[moment.mode]}** at {moment.elapsed:.2f} s", _words(moment)]
+    lines = [f"**{modes.NAMES[moment.mode]}** at {moment.elapsed:.2f} s", _words(moment)]
     if moment.found:
         lines.append("found: " + ", ".join(moment.found))
     if other is not None:
         apart = float(np.abs(moment.qd - other.qd).max())
         lines += [
-            f"**recomputed: {MODES[other.mode]}**", _words(other),
+            f"**recomputed: {modes.NAMES[other.mode]}**", _words(other),
             f"commands apart by up to {apart:.4f} rad/s; the see-through arm is where the "
             f"recomputed one leads in {AHEAD:g} s",
         ]  # fmt: skip

@@ -6,16 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from proxcgal.core.typing import Array
 from proxcgal.recording.reader import Recording
 from proxcgal.recording.replay import Replay
 from proxcgal.scenario.setup import Setup
 from proxcgal.sim.moment import Moment
 from proxcgal.sim.tick import Tick
 from proxcgal.viewer.scene_model import Stage
-
-Array = NDArray[np.float64]
 
 AHEAD = 0.5  #: [s] that a recomputed command is followed for, to be seen
 

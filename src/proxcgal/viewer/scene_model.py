@@ -8,14 +8,13 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from proxcgal.core.typing import Array
 from proxcgal.models import Robot
 from proxcgal.models.mesh.display import display_meshes
 from proxcgal.scenario.setup import Setup
 from proxcgal.scene.solids import Capsule, Solid
 from proxcgal.trial.walkthrough.grip import HAND
 from proxcgal.trial.walkthrough.interactive import WalkTrial
-
-Array = NDArray[np.float64]
 
 OPERATOR = "operator"  #: the capsule that rides on the tool
 

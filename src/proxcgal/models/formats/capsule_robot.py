@@ -13,10 +13,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from proxcgal._core import Capsule, LinkCapsule
 from proxcgal.core.errors import ModelError
+from proxcgal.core.typing import Array
 from proxcgal.models.capsules import capsule_mesh
 from proxcgal.models.description import Frame, Joint, Link, RobotDescription
 from proxcgal.models.formats.common import transform
-from proxcgal.models.mesh.triangles import Floats
 
 Vector = Annotated[tuple[float, ...], Field(min_length=3, max_length=3)]
 Range = Annotated[tuple[float, ...], Field(min_length=2, max_length=2)]
@@ -106,9 +106,9 @@ class CapsuleRobot(_Table):
         ]
 
     @cached_property
-    def placed(self) -> list[tuple[int, Floats]]:
+    def placed(self) -> list[tuple[int, Array]]:
         """Of each link: the joint that moves it (-1: none), and its frame in that joint's."""
-        found: list[tuple[int, Floats]] = []
+        found: list[tuple[int, Array]] = []
         joint, T_JL = -1, np.eye(4)
         for link in self.links:
             if link.joint is None:

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from proxcgal.core.errors import ModelError
+from proxcgal.core.typing import Array, Ints
 from proxcgal.models.description import Frame, Joint, Link, RobotDescription, listed
 from proxcgal.models.mesh.files import FARTHEST, clean, load_mesh
-from proxcgal.models.mesh.triangles import Floats, Ints
 
 # The frame that the base stands in, where it has no link of its own.
 WORLD = "world"
@@ -27,10 +27,10 @@ TOOL_NAMES = ("tool0", "TCP", "tcp", "tool", "ee_link", "flange", "attachment_si
 class Shape:
     """One piece of a link: a mesh file or triangles, and where they stand in the link frame."""
 
-    pose: Floats  # (4, 4)
+    pose: Array  # (4, 4)
     file: Path | None = None
-    scale: Floats | None = None  # (3,), of the file
-    mesh: tuple[Floats, Ints] | None = None
+    scale: Array | None = None  # (3,), of the file
+    mesh: tuple[Array, Ints] | None = None
 
 
 def number(text: str, what: str, most: float = FARTHEST) -> float:
@@ -42,7 +42,7 @@ def number(text: str, what: str, most: float = FARTHEST) -> float:
     return float(numbers(text, 1, what, most)[0])
 
 
-def numbers(text: str, count: int, what: str, most: float = FARTHEST) -> Floats:
+def numbers(text: str, count: int, what: str, most: float = FARTHEST) -> Array:
     """So many finite numbers, as they stand in an XML attribute, each of at most that size.
 
     Raises:
@@ -60,12 +60,12 @@ def numbers(text: str, count: int, what: str, most: float = FARTHEST) -> Floats:
     return values
 
 
-def is_direction(values: Floats) -> bool:
+def is_direction(values: Array) -> bool:
     """Whether an axis or a quaternion says which way."""
     return math.hypot(*values) > _NO_DIRECTION
 
 
-def transform(position: Sequence[float] | Floats, rpy: Sequence[float] | Floats) -> Floats:
+def transform(position: Sequence[float] | Array, rpy: Sequence[float] | Array) -> Array:
     """(4, 4) of a position [m] and roll, pitch, yaw [rad]: Rz(yaw) Ry(pitch) Rx(roll)."""
     (cr, sr), (cp, sp), (cy, sy) = ((math.cos(angle), math.sin(angle)) for angle in rpy)
     T = np.eye(4)
@@ -79,8 +79,8 @@ def transform(position: Sequence[float] | Floats, rpy: Sequence[float] | Floats)
 
 
 def build_link_mesh(
-    parts: Sequence[Shape], link: str, cache: dict[Path, tuple[Floats, Ints]]
-) -> tuple[Floats, Ints, int]:
+    parts: Sequence[Shape], link: str, cache: dict[Path, tuple[Array, Ints]]
+) -> tuple[Array, Ints, int]:
     """One clean mesh in the link frame out of a link's shapes.
 
     Returns:
@@ -158,7 +158,7 @@ def describe(
         )
     T_WU = np.linalg.inv(bodies[base].placement.homogeneous)
 
-    def placed(joint: int, pose: Floats) -> Floats:
+    def placed(joint: int, pose: Array) -> Array:
         return pose if joint else T_WU @ pose
 
     joints = [
@@ -189,7 +189,7 @@ def _joint(
     model: Any,
     data: Any,
     row: int,
-    placed: Callable[[int, Floats], Floats],
+    placed: Callable[[int, Array], Array],
     limits: Mapping[str, tuple[float, float]],
     speeds: Mapping[str, float],
     source: Path,
@@ -227,7 +227,7 @@ def _joint(
 
 def _links(shapes: Mapping[str, Sequence[Shape]], frames: Sequence[Frame]) -> list[Link]:
     """Each link with its mesh, base first."""
-    files: dict[Path, tuple[Floats, Ints]] = {}
+    files: dict[Path, tuple[Array, Ints]] = {}
     links = []
     for name, parts in shapes.items():
         vertices, triangles, dropped = build_link_mesh(parts, name, files)

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from proxcgal.core.cache import Stored, hash_file
+from proxcgal.core.typing import Array
 from proxcgal.models.description import Frame, Joint, Link, RobotDescription
-from proxcgal.models.mesh.triangles import Floats
 
 
 def description_to(description: RobotDescription, files: Iterable[Path]) -> Stored:
@@ -42,7 +42,7 @@ def description_from(entry: Stored) -> RobotDescription | None:
     try:
         if any(hash_file(Path(file)) != known for file, known in meta["files"].items()):
             return None
-        limits: Floats = arrays["limits"]
+        limits: Array = arrays["limits"]
         joints = tuple(
             Joint(
                 name=name,

@@ -15,11 +15,11 @@ from pathlib import Path
 import numpy as np
 
 from proxcgal.core.errors import GeometryError, ModelError
+from proxcgal.core.typing import Array, Ints
 from proxcgal.models.description import listed
 from proxcgal.models.formats.common import Shape, is_direction, number, numbers, transform
 from proxcgal.models.formats.paths import MeshFolders
 from proxcgal.models.mesh.files import box, cylinder, ellipsoid
-from proxcgal.models.mesh.triangles import Floats, Ints
 
 MAX_LINKS = 1000
 _AXIS = "1 0 0"  # where none is given
@@ -188,7 +188,7 @@ def _shape(element: ET.Element, link: str, folders: MeshFolders) -> Shape | None
         if (scale == 0).any():
             raise ModelError(f"{where} has mesh scale {scale.tolist()}; 0 leaves no surface")
         return Shape(pose, file=folders.find(kind.get("filename", ""), what), scale=scale)
-    made: tuple[Floats, Ints]
+    made: tuple[Array, Ints]
     if kind.tag == "box":
         made = box(_positive(numbers(kind.get("size", ""), 3, f"{where}, box size"), where))
     elif kind.tag == "cylinder":
@@ -204,7 +204,7 @@ def _shape(element: ET.Element, link: str, folders: MeshFolders) -> Shape | None
     return Shape(pose, mesh=made)
 
 
-def _positive(sizes: Floats, where: str) -> Floats:
+def _positive(sizes: Array, where: str) -> Array:
     if not (sizes > 0).all():
         raise GeometryError(
             f"{where} has a shape with size {sizes.tolist()}; more than 0 is needed"
@@ -212,7 +212,7 @@ def _positive(sizes: Floats, where: str) -> Floats:
     return sizes
 
 
-def _origin(element: ET.Element, what: str) -> Floats:
+def _origin(element: ET.Element, what: str) -> Array:
     """T (4, 4) of an <origin>."""
     origin = element.find("origin")
     if origin is None:
@@ -223,7 +223,7 @@ def _origin(element: ET.Element, what: str) -> Floats:
     )
 
 
-def _axis(element: ET.Element, what: str) -> Floats:
+def _axis(element: ET.Element, what: str) -> Array:
     axis = element.find("axis")
     return numbers(_AXIS if axis is None else axis.get("xyz", _AXIS), 3, f"{what}, axis")
 

@@ -12,13 +12,11 @@ are taken in rounds of collapses that do not touch one another, so that each rou
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxcgal._core import MeshTree
+from proxcgal.core.typing import Array, Bools, Ints
 from proxcgal.models.mesh.quadrics import cost, minimum, surface_quadrics
 from proxcgal.models.mesh.triangles import (
-    Floats,
-    Ints,
     compact,
     cross,
     dot,
@@ -29,8 +27,6 @@ from proxcgal.models.mesh.triangles import (
     point_triangle_distance,
     sample,
 )
-
-Bools = NDArray[np.bool_]
 
 # Of two equally flat edges the shorter goes first: keeps triangles round.
 _LENGTH_WEIGHT = 1e-9
@@ -57,7 +53,7 @@ _MOST_SAMPLES = 40_000
 class _Surface:
     """A surface in the middle of its simplification. Vertex rows stay, faces shrink."""
 
-    def __init__(self, vertices: Floats, triangles: Ints, tolerance: float) -> None:
+    def __init__(self, vertices: Array, triangles: Ints, tolerance: float) -> None:
         self.v = vertices.copy()
         self.f = triangles.astype(np.int64)
         self.count = len(np.unique(self.f))
@@ -107,7 +103,7 @@ class _Surface:
         elif self.tolerance > size:
             self.tolerance = np.inf
 
-    def _placements(self, edges: Ints, faces_on_edge: Ints) -> tuple[Floats, Floats]:
+    def _placements(self, edges: Ints, faces_on_edge: Ints) -> tuple[Array, Array]:
         """Where each edge would go, and what it costs [m^4]."""
         a, b = edges.T
         q = self.Q[a] + self.Q[b]
@@ -141,7 +137,7 @@ class _Surface:
         left = around.sum(1) - 2 * faces_on_edge
         return np.asarray((shared == faces_on_edge) & (left >= 2))
 
-    def _keeps_faces(self, edges: Ints, place: Floats, start: Ints, face_of: Ints) -> Bools:
+    def _keeps_faces(self, edges: Ints, place: Array, start: Ints, face_of: Ints) -> Bools:
         """No face turns over or becomes a sliver."""
         good = np.ones(len(edges), dtype=bool)
         for end in range(2):
@@ -157,7 +153,7 @@ class _Surface:
         return good
 
     def _keeps_points(
-        self, edges: Ints, place: Floats, start: Ints, face_of: Ints
+        self, edges: Ints, place: Array, start: Ints, face_of: Ints
     ) -> tuple[Bools, Ints, Ints]:
         """Which collapses keep old and new surface within the tolerance of each other.
 
@@ -239,7 +235,7 @@ class _Surface:
             free = free[~blocked[edges[free]].any(1)]
         return np.sort(np.concatenate(taken)) if taken else free
 
-    def _collapse(self, edges: Ints, place: Floats) -> None:
+    def _collapse(self, edges: Ints, place: Array) -> None:
         n = len(self.v)
         a, b = edges.T
         self.v[a] = place
@@ -261,8 +257,8 @@ class _Surface:
 
 
 def decimate(
-    vertices: Floats, triangles: Ints, count: int, tolerance: float = np.inf
-) -> tuple[Floats, Ints]:
+    vertices: Array, triangles: Ints, count: int, tolerance: float = np.inf
+) -> tuple[Array, Ints]:
     """Collapse edges until `count` vertices are left, or until none may go.
 
     Args:
@@ -294,10 +290,10 @@ def decimate(
     return compact(surface.v, surface.f)
 
 
-def _face_vectors(p: Floats) -> Floats:
+def _face_vectors(p: Array) -> Array:
     return cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
 
 
-def _longest(p: Floats) -> Floats:
+def _longest(p: Array) -> Array:
     sides = p - np.roll(p, 1, axis=1)
     return np.asarray(np.sqrt(np.maximum((sides**2).sum(2).max(1), 1e-300)))

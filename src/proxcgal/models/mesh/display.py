@@ -6,8 +6,8 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from proxcgal.core.typing import Array, Ints
 from proxcgal.models.mesh.resolution import COUNT_TOLERANCE, control_mesh
-from proxcgal.models.mesh.triangles import Floats, Ints
 from proxcgal.models.robots import Robot
 
 #: Of a link's mesh on a page: those of the controller's usual mesh, which is there already.
@@ -15,7 +15,7 @@ DISPLAY_VERTICES = 1000
 _DEVIATION = 0.002  # [m] as a robot's control meshes are made where nothing else is asked for
 
 
-def display_meshes(robot: Robot, vertices: int = DISPLAY_VERTICES) -> list[tuple[Floats, Ints]]:
+def display_meshes(robot: Robot, vertices: int = DISPLAY_VERTICES) -> list[tuple[Array, Ints]]:
     """A light mesh of each link: vertices_L (v, 3) [m] and triangles (f, 3), from the cache.
 
     Within 2 mm of the full one where so many vertices are enough for that; nothing is computed on
@@ -31,10 +31,10 @@ def display_meshes(robot: Robot, vertices: int = DISPLAY_VERTICES) -> list[tuple
     return made[vertices]
 
 
-_made: WeakKeyDictionary[Robot, dict[int, list[tuple[Floats, Ints]]]] = WeakKeyDictionary()
+_made: WeakKeyDictionary[Robot, dict[int, list[tuple[Array, Ints]]]] = WeakKeyDictionary()
 
 
-def _light(vertices_L: Floats, triangles: Ints, count: int) -> tuple[Floats, Ints]:
+def _light(vertices_L: Array, triangles: Ints, count: int) -> tuple[Array, Ints]:
     if len(vertices_L) <= count:
         return vertices_L, triangles
     most = (1.0 + COUNT_TOLERANCE) * count

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from proxcgal.core.errors import GeometryError
+from proxcgal.core.typing import Array, Ints
 from proxcgal.models.formats.safe_xml import parse_xml
-from proxcgal.models.mesh.triangles import Floats, Ints, compact, double_areas
+from proxcgal.models.mesh.triangles import compact, double_areas
 
 MAX_FACES = 5_000_000
 MAX_MESH_BYTES = 512 * 2**20
@@ -25,7 +26,7 @@ _NO_AREA = 1e-9
 _ROUND = 60
 
 
-def load_mesh(path: str | os.PathLike[str]) -> tuple[Floats, Ints]:
+def load_mesh(path: str | os.PathLike[str]) -> tuple[Array, Ints]:
     """Triangles of a mesh file, as they are in it.
 
     Args:
@@ -57,7 +58,7 @@ def load_mesh(path: str | os.PathLike[str]) -> tuple[Floats, Ints]:
     return vertices, triangles
 
 
-def check_mesh(vertices: Floats, triangles: Ints, what: str) -> None:
+def check_mesh(vertices: Array, triangles: Ints, what: str) -> None:
     """Refuse a mesh that no distance can be asked of.
 
     Raises:
@@ -87,7 +88,7 @@ def check_mesh(vertices: Floats, triangles: Ints, what: str) -> None:
         raise GeometryError(f"{what}: vertex {row} is {vertices[row].tolist()}{where}")
 
 
-def clean(vertices: Floats, triangles: Ints, what: str) -> tuple[Floats, Ints, int]:
+def clean(vertices: Array, triangles: Ints, what: str) -> tuple[Array, Ints, int]:
     """Join vertices that coincide and leave out faces without area.
 
     Returns:
@@ -118,7 +119,7 @@ def clean(vertices: Floats, triangles: Ints, what: str) -> tuple[Floats, Ints, i
     return np.ascontiguousarray(vertices, dtype=np.float64), welded, int(np.sum(~good))
 
 
-def _read_obj(data: bytes, path: Path) -> tuple[Floats, Ints]:
+def _read_obj(data: bytes, path: Path) -> tuple[Array, Ints]:
     """Vertices and faces of an OBJ; what else it holds (materials, normals) is for pictures.
 
     trimesh takes index 0 for the last vertex and drops what it cannot place, so it is not used.
@@ -155,7 +156,7 @@ def _read_obj(data: bytes, path: Path) -> tuple[Floats, Ints]:
     return points, np.array(faces, dtype=np.int64).reshape(-1, 3)
 
 
-def _read_with_trimesh(data: bytes, path: Path) -> tuple[Floats, Ints]:
+def _read_with_trimesh(data: bytes, path: Path) -> tuple[Array, Ints]:
     suffix = path.suffix.lower()
     if suffix == ".stl" and data[:5].lower() != b"solid":
         count = int.from_bytes(data[80:84], "little")
@@ -189,7 +190,7 @@ def _read_with_trimesh(data: bytes, path: Path) -> tuple[Floats, Ints]:
         return vertices * unit, np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)
 
 
-def box(size: Floats) -> tuple[Floats, Ints]:
+def box(size: Array) -> tuple[Array, Ints]:
     """A box of the given full size (3,) [m] round the origin."""
     corner = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
     faces = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
@@ -197,27 +198,27 @@ def box(size: Floats) -> tuple[Floats, Ints]:
     return corner * size, np.array(faces)
 
 
-def cylinder(radius: float, length: float) -> tuple[Floats, Ints]:
+def cylinder(radius: float, length: float) -> tuple[Array, Ints]:
     """A closed cylinder along z round the origin [m]."""
     return _turned([(0.0, -length / 2), (radius, -length / 2), (radius, length / 2),
                     (0.0, length / 2)])  # fmt: skip
 
 
-def ellipsoid(radii: Floats) -> tuple[Floats, Ints]:
+def ellipsoid(radii: Array) -> tuple[Array, Ints]:
     """An ellipsoid with semi-axes (3,) [m] round the origin; a sphere where they are equal."""
     angle = np.linspace(-np.pi / 2, np.pi / 2, _ROUND // 2 + 1)
     vertices, triangles = _turned(list(zip(np.cos(angle), np.sin(angle), strict=True)))
     return vertices * radii, triangles
 
 
-def capsule(radius: float, length: float) -> tuple[Floats, Ints]:
+def capsule(radius: float, length: float) -> tuple[Array, Ints]:
     """A capsule along z round the origin; `length` is that of its straight part [m]."""
     low = np.linspace(-np.pi / 2, 0, _ROUND // 4 + 1)
     profile = [(radius * np.cos(a), radius * np.sin(a) - length / 2) for a in low]
     return _turned(profile + [(r, -z) for r, z in reversed(profile)])
 
 
-def _turned(profile: list[tuple[float, float]]) -> tuple[Floats, Ints]:
+def _turned(profile: list[tuple[float, float]]) -> tuple[Array, Ints]:
     """A profile of (radius, z), from the axis to the axis, turned about z."""
     angle = 2 * np.pi * np.arange(_ROUND) / _ROUND
     rings = [np.stack([r * np.cos(angle), r * np.sin(angle), np.full(_ROUND, z)], axis=1)

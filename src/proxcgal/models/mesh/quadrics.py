@@ -6,16 +6,16 @@ Source: M. Garland and P. Heckbert, Surface simplification using quadric error m
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from proxcgal.models.mesh.triangles import Floats, Ints, cross, dot, rims, unit_normals
+from proxcgal.core.typing import Array, Bools, Ints
+from proxcgal.models.mesh.triangles import cross, dot, rims, unit_normals
 
 # Pulls a new vertex to its edge's middle where the quadric leaves it free (flat or straight parts);
 # without it the vertex may run off along the free direction.
 _STABILITY = 1e-3
 
 
-def surface_quadrics(vertices: Floats, triangles: Ints) -> tuple[Floats, NDArray[np.bool_]]:
+def surface_quadrics(vertices: Array, triangles: Ints) -> tuple[Array, Bools]:
     """Quadric of each vertex (v, 10), from its faces and rims, and which vertices are on a rim."""
     n = len(vertices)
     normal, area = unit_normals(vertices, triangles)
@@ -36,7 +36,7 @@ def surface_quadrics(vertices: Floats, triangles: Ints) -> tuple[Floats, NDArray
     return Q, on_rim
 
 
-def _of_planes(normal: Floats, point: Floats, weight: Floats) -> Floats:
+def _of_planes(normal: Array, point: Array, weight: Array) -> Array:
     """Squared distance to each plane, as the ten numbers of a symmetric 4 x 4 matrix."""
     a, b, c = normal.T
     d = -dot(normal, point)
@@ -44,7 +44,7 @@ def _of_planes(normal: Floats, point: Floats, weight: Floats) -> Floats:
     return np.asarray(weight[:, None] * np.stack(products, axis=1))
 
 
-def cost(q: Floats, x: Floats) -> Floats:
+def cost(q: Array, x: Array) -> Array:
     """Area-weighted sum of squared distances of x (n, 3) to the planes of q (n, 10) [m^4]."""
     a, b, c = x.T
     return np.asarray(
@@ -54,7 +54,7 @@ def cost(q: Floats, x: Floats) -> Floats:
     )  # fmt: skip
 
 
-def minimum(q: Floats, middle: Floats) -> Floats:
+def minimum(q: Array, middle: Array) -> Array:
     """Point of least cost, drawn to `middle` a little: (A + s I) x = s middle - b."""
     pull = _STABILITY * (q[:, 0] + q[:, 3] + q[:, 5]) + 1e-30
     xx, yy, zz = q[:, 0] + pull, q[:, 3] + pull, q[:, 5] + pull

@@ -10,16 +10,10 @@ import numpy as np
 from proxcgal._core import MeshTree
 from proxcgal.core.cache import Cache, Stored, hash_mesh
 from proxcgal.core.errors import ConfigError
+from proxcgal.core.typing import Array, Ints
 from proxcgal.models.mesh.decimation import decimate
 from proxcgal.models.mesh.subdivision import subdivide
-from proxcgal.models.mesh.triangles import (
-    Floats,
-    Ints,
-    compact,
-    double_areas,
-    is_number,
-    sample,
-)
+from proxcgal.models.mesh.triangles import compact, double_areas, is_number, sample
 
 # Bump when the same mesh and settings give another result.
 _VERSION = 2
@@ -41,7 +35,7 @@ _SURE = 0.97
 class ControlMesh:
     """The mesh that the controller uses for one link."""
 
-    vertices_L: Floats  # (v, 3) [m]
+    vertices_L: Array  # (v, 3) [m]
     triangles: Ints  # (f, 3)
     deviation: float  # how far it and the full mesh are apart at most, both ways [m]
 
@@ -67,7 +61,7 @@ def check_resolution(name: str, count: object, max_deviation: object) -> None:
 
 
 def control_mesh(
-    vertices: Floats, triangles: Ints, count: int | None, max_deviation: float
+    vertices: Array, triangles: Ints, count: int | None, max_deviation: float
 ) -> ControlMesh:
     """A mesh of about `count` vertices, from the cache where it was made before.
 
@@ -96,7 +90,7 @@ def control_mesh(
     return made
 
 
-def _coarser(vertices: Floats, triangles: Ints, count: int, bound: float) -> ControlMesh:
+def _coarser(vertices: Array, triangles: Ints, count: int, bound: float) -> ControlMesh:
     if not np.isfinite(bound):
         v, f = decimate(vertices, triangles, count)
         return ControlMesh(v, f, deviation(vertices, triangles, v, f))
@@ -107,9 +101,7 @@ def _coarser(vertices: Floats, triangles: Ints, count: int, bound: float) -> Con
     return ControlMesh(vertices, triangles, 0.0)
 
 
-def deviation(
-    vertices_a: Floats, triangles_a: Ints, vertices_b: Floats, triangles_b: Ints
-) -> float:
+def deviation(vertices_a: Array, triangles_a: Ints, vertices_b: Array, triangles_b: Ints) -> float:
     """How far two surfaces are apart at most, from samples of each to the other [m]."""
     return max(
         _one_way(vertices_a, triangles_a, MeshTree(vertices_b, triangles_b)),
@@ -117,7 +109,7 @@ def deviation(
     )
 
 
-def _one_way(vertices: Floats, triangles: Ints, other: MeshTree) -> float:
+def _one_way(vertices: Array, triangles: Ints, other: MeshTree) -> float:
     area = double_areas(vertices, triangles).sum() / 2
     points, _ = sample(vertices, triangles, max(_SPACING, float(np.sqrt(area / _MOST_SAMPLES))),
                        corners=False)  # fmt: skip

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from proxcgal.models.mesh.triangles import Floats, Ints, half_edges
+from proxcgal.core.typing import Array, Ints
+from proxcgal.models.mesh.triangles import half_edges
 
 # Edges at least this share of the longest go in the same round.
 _SHARE = 0.7
 
 
-def subdivide(vertices: Floats, triangles: Ints, count: int) -> tuple[Floats, Ints]:
+def subdivide(vertices: Array, triangles: Ints, count: int) -> tuple[Array, Ints]:
     """Halve edges until there are `count` vertices; no point of the surface moves.
 
     An edge goes when it is the longest of each of its faces, and every face on it is cut, so that

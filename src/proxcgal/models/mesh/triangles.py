@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any, TypeGuard
+from typing import TypeGuard
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.signedinteger[Any]]
+from proxcgal.core.typing import Array, Ints
 
 
 def is_number(value: object) -> TypeGuard[float]:
@@ -16,20 +14,20 @@ def is_number(value: object) -> TypeGuard[float]:
     return isinstance(value, int | float | np.integer | np.floating)
 
 
-def compact(vertices: Floats, triangles: Ints) -> tuple[Floats, Ints]:
+def compact(vertices: Array, triangles: Ints) -> tuple[Array, Ints]:
     """Leave out the vertices that no triangle uses."""
     used, rows = np.unique(triangles, return_inverse=True)
     return vertices[used], rows.reshape(-1, 3).astype(np.int32)
 
 
-def double_areas(vertices: Floats, triangles: Ints) -> Floats:
+def double_areas(vertices: Array, triangles: Ints) -> Array:
     """Twice the area of each triangle [m^2], (f,)."""
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     normal = cross(b - a, c - a)
     return np.sqrt(dot(normal, normal))
 
 
-def unit_normals(vertices: Floats, triangles: Ints) -> tuple[Floats, Floats]:
+def unit_normals(vertices: Array, triangles: Ints) -> tuple[Array, Array]:
     """Unit normals (f, 3) (zero where there is no area) and areas (f,) [m^2]."""
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     normal = cross(b - a, c - a)
@@ -74,7 +72,7 @@ def gather(start: Ints, items: Ints, rows: Ints) -> tuple[Ints, Ints]:
     return index, items[np.repeat(start[rows] - before, size) + np.arange(len(index))]
 
 
-def point_triangle_distance(points: Floats, corners: Floats) -> Floats:
+def point_triangle_distance(points: Array, corners: Array) -> Array:
     """Distance from points (n, 3) to one triangle (n, 3, 3) each [m].
 
     Source: C. Ericson, Real-time collision detection, 2005, section 5.1.5, by the nearer of the
@@ -95,20 +93,20 @@ def point_triangle_distance(points: Floats, corners: Floats) -> Floats:
     return np.sqrt(np.where(inside, np.minimum(best, height), best))
 
 
-def dot(a: Floats, b: Floats) -> Floats:
+def dot(a: Array, b: Array) -> Array:
     """Row by row, (n,)."""
     return np.asarray(a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2])
 
 
-def cross(a: Floats, b: Floats) -> Floats:
+def cross(a: Array, b: Array) -> Array:
     """Row by row, (n, 3); several times as fast as numpy's general one."""
     (ax, ay, az), (bx, by, bz) = a.T, b.T
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
 
 
 def sample(
-    vertices: Floats, triangles: Ints, spacing: float, corners: bool = True
-) -> tuple[Floats, Ints]:
+    vertices: Array, triangles: Ints, spacing: float, corners: bool = True
+) -> tuple[Array, Ints]:
     """Points spread over a surface, no more than about `spacing` apart [m], the same every time.
 
     Args:
@@ -140,7 +138,7 @@ def sample(
     return np.concatenate(points), np.concatenate(owners)
 
 
-def _repeat(times: Floats) -> tuple[Ints, Ints, Ints]:
+def _repeat(times: Array) -> tuple[Ints, Ints, Ints]:
     """Each row floor(times) times: the row, which time it is, and how many there are."""
     count = times.astype(np.int64)
     row = np.repeat(np.arange(len(count)), count)

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from proxcgal.core.typing import Array
 from proxcgal.scene.human.subject import radius
-
-Array = NDArray[np.float64]
 
 #: What a motion says where it is, in this order. `head` is its top, `hand` the fingertips.
 POINTS = (

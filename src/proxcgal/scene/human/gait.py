@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from proxcgal.core.typing import Array
 from proxcgal.scene.human.smooth import minimum_jerk
-
-Array = NDArray[np.float64]
 
 TURN_M = 0.20  # [m] of way that a turn of 1 rad counts as
 LIFT = 0.05  # [m] height of a swinging foot

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxcgal.core.errors import ConfigError
+from proxcgal.core.typing import Array
 from proxcgal.scene.human import gait
 from proxcgal.scene.human.body import POINTS
 from proxcgal.scene.human.operator import Operator, Step
@@ -24,8 +24,6 @@ from proxcgal.scene.human.stance import (
     torso,
 )
 from proxcgal.scene.human.subject import HEAD_TOP, HIP, HIPS, SHIN, SHOULDER, THIGH, Subject, radius
-
-Array = NDArray[np.float64]
 
 HZ = 100.0  # of the grid that a motion is laid out on
 WALKING_ACCELERATION = 3.0  # [m/s^2]

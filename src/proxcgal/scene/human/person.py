@@ -5,16 +5,14 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from proxcgal.core.typing import Array
 from proxcgal.scene.human import body
 from proxcgal.scene.human.motion import Motion, move
 from proxcgal.scene.human.operator import Operator
 from proxcgal.scene.human.recorded import read_motion
 from proxcgal.scene.human.subject import draw_subject
 from proxcgal.scene.solids import Capsule, Solid
-
-Array = NDArray[np.float64]
 
 
 class Person:

@@ -6,9 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from proxcgal.core.typing import Array
 
 PEAK_SPEED = 1.875  # of a minimum-jerk motion, over its mean speed
 PEAK_ACCELERATION = 5.7735  # over length / duration^2

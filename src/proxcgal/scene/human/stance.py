@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from proxcgal.core.typing import Array
 from proxcgal.scene.human.smooth import two_bones
 from proxcgal.scene.human.subject import (
     HIP,
@@ -18,8 +18,6 @@ from proxcgal.scene.human.subject import (
     Subject,
     radius,
 )
-
-Array = NDArray[np.float64]
 
 STRAIGHT = 0.985  # of the leg's length: knees are never quite straight
 STEP = 0.30  # length of a step at most, of stature

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import polars as pl
 
+from proxcgal.core import modes
 from proxcgal.core.errors import ConfigError
 from proxcgal.evaluation.metrics import Summary
 from proxcgal.scenario.keys import FAULT_VALUES
@@ -16,7 +17,7 @@ from proxcgal.sim.mount_faults import look
 from proxcgal.sim.source import SimulatedSource
 from proxcgal.sim.world import World
 from proxcgal.study.campaign import Campaign, Trial, plain
-from proxcgal.study.faults.cases import MODES, ROW_OF, ROWS, RUN, STOP, TICK_MS, Fault, Row
+from proxcgal.study.faults.cases import ROW_OF, ROWS, TICK_MS, Fault, Row
 from proxcgal.study.faults.figures import figures
 from proxcgal.study.faults.texts import captions, listings, pages, verdicts
 from proxcgal.study.kind import Kind, Wishes
@@ -158,18 +159,18 @@ def perform(trial: Trial, report: Report) -> Numbers:
     latency = float(time[reached][0] - onset) if reached.any() else np.inf
     worst = int(log.mode[after].max())
     free = time > onset + row.duration + RECOVERY
-    recovered = row.least == STOP or bool((log.mode[free] == RUN).all())
+    recovered = row.least == modes.STOP or bool((log.mode[free] == modes.RUN).all())
     told = not row.finding or log.findings.get(row.finding, 0) > 0
     same = not row.same_commands or _same(trial, log, report)
     calm = not ((log.leaked_points > 0) & (log.activation > 0.0)).any()
-    in_time = row.least == RUN or latency <= row.within + TICK_MS / 1000.0 + _SLACK
+    in_time = row.least == modes.RUN or latency <= row.within + TICK_MS / 1000.0 + _SLACK
     right = in_time and worst <= row.most and told and recovered and same
     right = right and (calm or not row.no_flight)
     return {
         "right": bool(right and np.isfinite(log.qd).all()),
-        "latency_ms": 1000.0 * latency if np.isfinite(latency) and row.least > RUN else None,
+        "latency_ms": 1000.0 * latency if np.isfinite(latency) and row.least > modes.RUN else None,
         "reached": bool(reached.any()),
-        "worst_mode": MODES[worst],
+        "worst_mode": modes.NAMES[worst],
         "told": told,
         "recovered": recovered,
         "same_commands": same,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-RUN, DEGRADED, HOLD, STOP = range(4)
-MODES = ("RUN", "DEGRADED", "HOLD", "STOP")
+from proxcgal.core.modes import DEGRADED, HOLD, RUN, STOP
+
 SENSORS = 10  # of the array that a fault hits
 TICK_MS = 10  # a fault is answered at the next tick
 

@@ -8,8 +8,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from proxcgal.core.modes import DEGRADED, HOLD, NAMES, RUN, STOP
 from proxcgal.evaluation.metrics import Summary
-from proxcgal.study.faults.cases import DEGRADED, HOLD, MODES, ROWS, RUN, STOP
+from proxcgal.study.faults.cases import ROWS
 from proxcgal.study.figures import DPI, GREY, LEGEND
 
 COLOURS = {DEGRADED: "#E69F00", HOLD: "#0072B2", STOP: "#333333"}
@@ -48,7 +49,7 @@ def figures(table: pl.DataFrame, _: Summary | None = None) -> dict[str, Figure]:
         ax.set_yticks(range(len(rows)), [row.name for row in reversed(rows)], fontsize=9)
         ax.spines[["top", "right"]].set_visible(False)
         ax.set_xlim(left=-5.0)  # a bound of 0 is seen
-    handles = [Line2D([], [], color=colour, marker=".", linestyle="", label=MODES[mode])
+    handles = [Line2D([], [], color=colour, marker=".", linestyle="", label=NAMES[mode])
                for mode, colour in COLOURS.items()]  # fmt: skip
     handles.append(Line2D([], [], color=GREY, linewidth=2, label="bound"))
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), **LEGEND)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from proxcgal.core.modes import RUN
 from proxcgal.evaluation.metrics import counted
-from proxcgal.study.faults.cases import RUN, Row
+from proxcgal.study.faults.cases import Row
 
 _CONTROLLER = "cpp/tests/test_controller.cpp"
 _STALENESS = "cpp/tests/test_staleness.cpp"

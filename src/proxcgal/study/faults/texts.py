@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from proxcgal.core import modes
 from proxcgal.evaluation.metrics import Summary
-from proxcgal.study.faults.cases import MODES, ROW_OF, ROWS, RUN, TICK_MS, Row
+from proxcgal.study.faults.cases import ROW_OF, ROWS, TICK_MS, Row
 from proxcgal.study.faults.reliability_page import page, whole_ms
 from proxcgal.study.kind import Listing
 
@@ -14,7 +15,7 @@ def listings(summary: Summary) -> list[Listing]:
     for robot, rows in summary["robots"].items():
         for name, found in rows.items():
             row = ROW_OF[name]
-            bound = f"{1000 * row.within:.0f} + {TICK_MS}" if row.least > RUN else "-"
+            bound = f"{1000 * row.within:.0f} + {TICK_MS}" if row.least > modes.RUN else "-"
             lines.append(
                 (
                     name, robot, _required(row), str(found["runs"]), str(found["right"]),
@@ -42,8 +43,8 @@ def _required(row: Row) -> str:
     if row.refused:
         return "refused"
     if row.least == row.most:
-        return MODES[row.least]
-    return f"{MODES[row.least]} or {MODES[row.most]}"
+        return modes.NAMES[row.least]
+    return f"{modes.NAMES[row.least]} or {modes.NAMES[row.most]}"
 
 
 def verdicts(summary: Summary) -> list[str]:

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 import polars as pl
-from numpy.typing import NDArray
 
 from proxcgal.core.errors import ConfigError
+from proxcgal.core.modes import HOLD
+from proxcgal.core.typing import Array
 from proxcgal.evaluation.phases import SAMPLES_HZ, mean_distances
 from proxcgal.evaluation.trial_log import TOO_CLOSE, TrialLog, sampled_ticks
 from proxcgal.scenario.loading import CONTROLLERS, HriScenario, load_scenario
@@ -29,7 +30,6 @@ SCENES = ("hri_task1", "hri_task2")
 #: Of the ticks under 0.05 m: the human was in a blind spot where the cloud's nearest point was
 #: this much farther away than the human really was, or there was none.
 UNSEEN_M = 0.05
-_HELD = 2  # modes from here on: HOLD, STOP
 _ROUNDING = 1e-6  # of a limit
 COLUMNS = (
     "mean_m", "seen_mean_m", "empty_ticks", "ticks", "true_min_m", "true_min_link",
@@ -188,7 +188,7 @@ def numbers(log: TrialLog, scenario: HriScenario) -> Row:
         "blind_ticks": int((close & (log.seen_m - log.true_m > UNSEEN_M)).sum()),
         "self_min_m": summary["self_min_m"],
         "leaked_points_max": summary["leaked_points_max"],
-        "held_ticks": int((log.mode >= _HELD).sum()),
+        "held_ticks": int((log.mode >= HOLD).sum()),
         "finite": finite,
         "limits_kept": finite and _limits_kept(log, setup),
         "phase_means": json.dumps(means),
@@ -216,7 +216,7 @@ def _limits_kept(log: TrialLog, setup: Setup) -> bool:
     )
 
 
-def _series(values: NDArray[np.float64]) -> Series:
+def _series(values: Array) -> Series:
     """Tenths of a millimetre, or of a thousandth; None where there is nothing."""
     return [round(v, 4) if np.isfinite(v) else None for v in values.tolist()]
 

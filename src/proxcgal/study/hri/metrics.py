@@ -7,14 +7,12 @@ from collections.abc import Collection
 
 import numpy as np
 import polars as pl
-from numpy.typing import NDArray
 
+from proxcgal.core.typing import Array
 from proxcgal.evaluation.metrics import SELF_LIMIT_M, Summary
 from proxcgal.evaluation.phases import SAMPLES_HZ
 from proxcgal.study.bootstrap import mean_interval
 from proxcgal.study.campaign import Campaign
-
-Array = NDArray[np.float64]
 
 #: [WA] Tables I and II: mean and sigma_max [m] by row and controller.
 PAPER = {

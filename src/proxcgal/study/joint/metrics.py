@@ -6,8 +6,9 @@ import json
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from proxcgal.core.modes import HOLD
+from proxcgal.core.typing import Array
 from proxcgal.evaluation.ground_truth import Truth
 from proxcgal.evaluation.metrics import NOTHING_M
 from proxcgal.models import macro_micro
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
     from proxcgal.study.store import Row
     from proxcgal.trial.trial import TrialLog
 
-Array = NDArray[np.float64]
-
 SERIES_S = 0.1  # [s] between the points of a curve
 COLUMNS = (
     "succeeded", "outcome", "reason", "time_s", "position_error_m", "angle_error_rad",
@@ -28,7 +27,6 @@ COLUMNS = (
     "macro_share", "way_m", "self_min_m", "held_ticks", "holds_task", "holds_link",
     "holds_obstacle", "holds_sensor", "holds_zone", "tick_p99_us", "series",
 )  # fmt: skip
-_HELD = 2  # modes from here on: HOLD, STOP
 
 
 def numbers_of(log: TrialLog, scenario: Scenario, robot: Robot) -> Row:
@@ -66,7 +64,7 @@ def numbers_of(log: TrialLog, scenario: Scenario, robot: Robot) -> Row:
         "macro_share": float(moved[0] / moved.sum()) if moved.sum() > 0.0 else 0.0,
         "way_m": float(np.linalg.norm(np.diff(log.tool_W, axis=0), axis=1).sum()),
         "self_min_m": numbers["self_min_m"],
-        "held_ticks": int((log.mode >= _HELD).sum()),
+        "held_ticks": int((log.mode >= HOLD).sum()),
         "holds_task": held.task if held is not None else "",
         "holds_link": held.link if held is not None else "",
         "holds_obstacle": held.obstacle if held is not None else "",

@@ -9,6 +9,7 @@ import numpy as np
 import polars as pl
 
 from proxcgal.core.errors import ConfigError
+from proxcgal.core.modes import HOLD
 from proxcgal.evaluation.metrics import (
     CONTROLLER_KEYS,
     COVERAGE_KEYS,
@@ -46,7 +47,6 @@ MOMENT_KEYS = tuple(
         "sighting_age_at_{}_s",
     )
 )  # fmt: skip
-_HELD = 2  # modes from here on: HOLD, STOP
 _AXES = ("x", "y", "z")
 _ANGLES = ("roll", "pitch", "yaw")
 
@@ -114,7 +114,7 @@ def perform(trial: Trial, report: Report) -> Row:
         row[f"sighting_at_{name}"] = sighting.kind if sighting else None
         row[f"sighting_age_at_{name}_s"] = sighting.age_s if sighting and known else None
     row["leaked_points_max"] = numbers["leaked_points_max"]
-    row["held_ticks"] = int((log.mode >= _HELD).sum())
+    row["held_ticks"] = int((log.mode >= HOLD).sum())
     return row | _drawn(trial.scenario)
 
 

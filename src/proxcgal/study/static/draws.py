@@ -8,16 +8,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxcgal import _core
 from proxcgal.core.errors import ConfigError
 from proxcgal.core.transforms import inverse, placed
+from proxcgal.core.typing import Array
 from proxcgal.models import Robot
 from proxcgal.models.surfaces import Surfaces
 from proxcgal.scenario.loading import Scenario, change_scenario
-
-Array = NDArray[np.float64]
 
 # Uniform, to either side of the scene's own value. Fixed before any drawn scene was run.
 POSITION_M = 0.10  # of the panel's centre, along each axis

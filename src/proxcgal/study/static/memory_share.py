@@ -7,16 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import polars as pl
-from numpy.typing import NDArray
 
+from proxcgal.core.typing import Array
 from proxcgal.evaluation.metrics import NOTHING_M, Summary
 from proxcgal.study.bootstrap import ENOUGH, ratio_interval
 from proxcgal.study.paired import ends_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-Array = NDArray[np.float64]
 
 WORSE_MM = 20.0  # nearer than without memory by more than this, a draw is listed
 _ANOTHER_WAY_M = 0.05  # goal errors so far apart are of two ways

@@ -9,14 +9,12 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
 
 from proxcgal import _core
+from proxcgal.core.typing import Array
 from proxcgal.study.figures import DPI, LEGEND
 from proxcgal.study.pair_figure import PAIR_COLOUR, frame_3d, pair_arrow, surface_points
 from proxcgal.study.timing.inputs import Inputs
-
-Array = NDArray[np.float64]
 
 RAW_COLOUR, NEAR_COLOUR, ROBOT_COLOUR = "#3A7BDB", "#17803D", "#404040"
 

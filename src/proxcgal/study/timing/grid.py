@@ -10,15 +10,13 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxcgal import _core
 from proxcgal.core.errors import SimulationError
+from proxcgal.core.typing import Array
 from proxcgal.evaluation.metrics import Summary
 from proxcgal.study.timing.growth import fit_growth
 from proxcgal.study.timing.inputs import Inputs
-
-Array = NDArray[np.float64]
 
 ALGORITHMS = {1: "robot body removal", 2: "closest pair"}
 METHODS = ("paper", "fast")

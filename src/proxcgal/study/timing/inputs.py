@@ -6,14 +6,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxcgal.core.errors import ConfigError
+from proxcgal.core.typing import Array
 from proxcgal.models import Robot, load_robot
 from proxcgal.scenario.loading import Scenario
 from proxcgal.sim.static_scan import Snapshot, take_snapshot
-
-Array = NDArray[np.float64]
 
 SCENARIOS = ("timing_ur10e", "timing_panda")
 VERTICES = (100, 300, 1000, 3000, 10000)  # a link

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxcgal.core.errors import ConfigError
 from proxcgal.scenario.loading import load_scenario
@@ -15,8 +14,6 @@ from proxcgal.scenario.walkthrough import WalkScenario
 from proxcgal.study.trials import robot_of
 from proxcgal.trial.walkthrough.intended_path import Wish
 from proxcgal.trial.walkthrough.setup import WalkSetup
-
-Array = NDArray[np.float64]
 
 #: What an operator does, and the scenario that it is drawn round.
 WISHES = {

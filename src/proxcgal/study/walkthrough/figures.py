@@ -9,16 +9,16 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from proxcgal.core.typing import Array
 from proxcgal.study.figures import DASHED, DPI, GREY, LEGEND
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from numpy.typing import NDArray
 
     from proxcgal.trial.walkthrough.log import WalkLog
     from proxcgal.trial.walkthrough.run import WalkResult
 
-    Array = NDArray[np.float64]
+    Array = Array
 
 BLUE, ORANGE, RED, GREEN = "#0072B2", "#E69F00", "#D55E00", "#009E73"
 SCALE = 1.08  # of the tallest curve: how high the STO signal is drawn

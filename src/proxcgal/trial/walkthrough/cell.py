@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxcgal import _core
+from proxcgal.core.typing import Array
 from proxcgal.trial.walkthrough.setup import WalkSetup
-
-Array = NDArray[np.float64]
 
 
 class Cell:

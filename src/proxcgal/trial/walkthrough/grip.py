@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from proxcgal.core.typing import Array
 from proxcgal.scenario.walkthrough import Hand as HandKeys
 from proxcgal.trial.walkthrough.hand import Pull
-
-Array = NDArray[np.float64]
 
 HAND = "hand at the tool"  #: its name, beside those of solids
 SPEED = 2.0  #: [m/s] at most: above what a guard lets an arm do

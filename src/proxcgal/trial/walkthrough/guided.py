@@ -7,9 +7,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxcgal import _core
+from proxcgal.core.typing import Array
 from proxcgal.scenario.walkthrough import GuidedScenario
 from proxcgal.sim.source import SimulatedSource
 from proxcgal.sim.tick import TickInput
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from proxcgal.evaluation.trial_log import TrialLog
     from proxcgal.scenario.setup import Setup
     from proxcgal.sim.world import World
-
-Array = NDArray[np.float64]
 
 __all__ = ["GuidedScenario", "GuidedSource", "off_path", "off_paths"]
 

@@ -5,12 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from proxcgal.core.typing import Array
 from proxcgal.scenario.walkthrough import Hand as HandKeys
 from proxcgal.trial.walkthrough.intended_path import Wish
-
-Array = NDArray[np.float64]
 
 _TREMOR_HZ = (8.0, 12.0)
 _TONES = 6  # sinusoids of random frequency and phase that make a tremor

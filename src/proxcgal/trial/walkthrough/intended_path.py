@@ -7,11 +7,9 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from proxcgal.core.typing import Array
 from proxcgal.scenario.walkthrough import Leg
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

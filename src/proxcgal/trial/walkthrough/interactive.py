@@ -9,17 +9,15 @@ import time as clock
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxcgal import _core
 from proxcgal.core.transforms import pose
+from proxcgal.core.typing import Array
 from proxcgal.scenario.walkthrough import WalkScenario
 from proxcgal.sim.moment import Posed
 from proxcgal.trial.walkthrough.cell import Cell
 from proxcgal.trial.walkthrough.grip import HAND, Grip
 from proxcgal.trial.walkthrough.setup import PERIOD, WalkSetup
-
-Array = NDArray[np.float64]
 
 CYCLES = 10  #: of the guard, in one step
 #: Units of what the safety functions find.

@@ -6,13 +6,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxcgal import _core
+from proxcgal.core.typing import Array, Bools
 from proxcgal.scenario.walkthrough import Guard
 from proxcgal.sim.physics import Physics, Truth
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,7 +44,7 @@ class WalkLog:
     protective_m: Array  #: (n,) [m] ISO/TS 15066 at that velocity
     speed_ratio: Array  #: (n,) largest |qd| / qd_UB
     acceleration_ratio: Array  #: (n,) largest |qdd| / qdd_UB
-    torque: NDArray[np.bool_]  #: (n,) the STO signal
+    torque: Bools  #: (n,) the STO signal
     true_tcp_speed: Array  #: (n,) [m/s] by the simulator, nan where not asked
     true_distance: Array  #: (n,) [m]
     true_velocity: Array  #: (n,) [m/s]
@@ -137,14 +135,14 @@ class WalkLog:
         """Of the tool once the torque is cut: it may speed up before the brakes hold [m/s]."""
         return float(self.tcp_speed[self.trips[0].cycle :].max()) if self.trips else None
 
-    def truly_violated(self) -> NDArray[np.bool_]:
+    def truly_violated(self) -> Bools:
         """(n,) cycles under torque in which the simulator itself finds a bound violated.
 
         Its kinematics, distances and accelerations are MuJoCo's own; what differs from the guard's
         by rounding alone does not count.
         """
         under_torque = np.r_[False, self.torque[:-1]]
-        found: NDArray[np.bool_] = under_torque & (
+        found: Bools = under_torque & (
             (self.true_tcp_speed > self.tcp_limit + _ROUNDING)
             | (self.true_speed_ratio > 1.0 + _ROUNDING)
             | (self.true_acceleration_ratio > 1.0 + _ROUNDING)

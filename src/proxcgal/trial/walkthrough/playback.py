@@ -6,15 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxcgal.core.errors import ConfigError
+from proxcgal.core.typing import Array
 from proxcgal.models import Robot
 from proxcgal.trial.walkthrough.log import WalkLog
 from proxcgal.trial.walkthrough.setup import PERIOD, WalkSetup
 from proxcgal.trial.walkthrough.taught import TaughtPath, needed_scale, tool_positions
-
-Array = NDArray[np.float64]
 
 _RESET_AT, _BEGIN = 0.01, 0.10  # [s] the button, the first motion
 _SETTLE = 0.4  # [s] at the start and at the end of the path

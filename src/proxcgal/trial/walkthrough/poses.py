@@ -18,14 +18,12 @@ from mcap.exceptions import McapError
 from mcap.records import Message, Metadata
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, IndexType, Writer
-from numpy.typing import NDArray
 
 from proxcgal.core.closing import Closing
 from proxcgal.core.errors import ConfigError, RecordingError
+from proxcgal.core.typing import Array, Bools
 from proxcgal.core.versions import versions
 from proxcgal.recording.foxglove import nanoseconds
-
-Array = NDArray[np.float64]
 
 PROFILE = "proxcgal"
 TOPIC, SETTINGS = "/pose", "proxcgal"
@@ -120,7 +118,7 @@ class TaughtPoses:
     position_W: Array  #: (n, 3) [m] of the tool
     rotation_WT: Array  #: (n, 3, 3)
     force: Array  #: (n, 6) [N], [N m]
-    torque: NDArray[np.bool_]  #: (n,)
+    torque: Bools  #: (n,)
     damage: str | None  #: why reading ended early; None for a whole file
 
 

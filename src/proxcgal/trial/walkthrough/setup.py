@@ -8,17 +8,15 @@ from pathlib import Path
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxcgal import _core
 from proxcgal.core.errors import ConfigError
+from proxcgal.core.typing import Array
 from proxcgal.models import Robot, load_robot
 from proxcgal.models.builtin import ga_ol
 from proxcgal.models.formats.capsule_robot import CapsuleRobot, read_capsule_robot
 from proxcgal.scenario.walkthrough import WalkScenario
 from proxcgal.sim.physics import OperatorShape, Physics
-
-Array = NDArray[np.float64]
 
 PERIOD = 0.001  #: [s] of the guard's, the guiding's and the physics' cycle, [WT] section 3
 

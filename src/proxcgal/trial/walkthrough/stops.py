@@ -5,14 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxcgal.sim.physics import Physics
 from proxcgal.trial.walkthrough.log import WalkLog
 from proxcgal.trial.walkthrough.setup import PERIOD, WalkSetup
 from proxcgal.trial.walkthrough.teach import teach
-
-Array = NDArray[np.float64]
 
 BRAKE_SCALES = (0.7, 1.0, 1.3)
 WORST_SPEED, WORST_PAYLOAD = 1.30, 5.0  # [m/s] of the tool, downwards; [kg]

@@ -10,12 +10,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxcgal.core.errors import ConfigError
+from proxcgal.core.typing import Array
 from proxcgal.models import Robot
-
-Array = NDArray[np.float64]
 
 _REST = 1e-3  # [rad/s] of every joint: slower at the ends is waiting
 _KEPT = 0.1  # [s] of waiting that is kept at each end
