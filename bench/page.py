@@ -17,13 +17,14 @@ from pathlib import Path
 import numpy as np
 import viser
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
 from browser import chromium, until
+
 from proxcgal.core.provenance import machine
 from proxcgal.scenario.loading import Scenario, load_scenario
 from proxcgal.viewer.access import close, serve
 from proxcgal.viewer.live_page import LivePage
-from proxcgal.viewer.messages import Told
+from proxcgal.viewer.messages import Update
 from proxcgal.viewer.simulation import FRAME_HZ, simulate
 
 CANVAS = (640, 400)  # [px]
@@ -39,14 +40,14 @@ def scenario() -> Scenario:
     return room.model_copy(update={"skin": room.skin.model_copy(update={"rings": (ring,)})})
 
 
-def alone(scene: Scenario, seconds: float) -> Told:
+def alone(scene: Scenario, seconds: float) -> Update:
     """The simulation in its process, asked once, at the end."""
     context = multiprocessing.get_context("spawn")
     link, theirs = context.Pipe()
     process = context.Process(target=simulate, args=(theirs, scene, "wb", 1.0), daemon=True)
     process.start()
     theirs.close()
-    while (told := link.recv()).stage is None:
+    while (told := link.recv()).model is None:
         assert not told.failed, told.failed
     clock.sleep(seconds)
     while link.poll():
@@ -58,7 +59,7 @@ def alone(scene: Scenario, seconds: float) -> Told:
     return told
 
 
-def served(scene: Scenario, seconds: float) -> Told:
+def served(scene: Scenario, seconds: float) -> Update:
     """The same with the page drawn, and nobody looking on."""
     server, gate = serve("127.0.0.1", 0, label="bench")
     page = LivePage(server, gate, scene, "wb")
@@ -71,7 +72,7 @@ def served(scene: Scenario, seconds: float) -> Told:
         close(server)
 
 
-def looked_at(scene: Scenario, seconds: float) -> tuple[Told, dict[str, float]]:
+def looked_at(scene: Scenario, seconds: float) -> tuple[Update, dict[str, float]]:
     """The same with the page open in a browser on the same machine."""
     server, gate = serve("127.0.0.1", 0, label="bench")
     page = LivePage(server, gate, scene, "wb")
@@ -97,7 +98,7 @@ def looked_at(scene: Scenario, seconds: float) -> tuple[Told, dict[str, float]]:
         close(server)
 
 
-def figures(told: Told) -> dict[str, float]:
+def figures(told: Update) -> dict[str, float]:
     return {
         "tick_cpu_us": told.cpu_us, "late_median_us": told.late_us[0],
         "late_p99_us": told.late_us[1], "real_time": told.real_time,

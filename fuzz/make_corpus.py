@@ -112,9 +112,9 @@ def _recordings() -> dict[str, bytes]:
     settings = Settings(scenario=scenario, controller="wb", seed=0, meshes={"a": "b"}, versions={})
     known = dataclasses.replace(settings, known_points_W=np.zeros((4, 3)))
     files = {}
-    for name, given in {"whole": settings, "known": known}.items():
+    for name, inputs in {"whole": settings, "known": known}.items():
         with Recorder(path) as recorder:
-            recorder.start(given)
+            recorder.start(inputs)
             for row in range(3):
                 recorder.write(_tick(row))
         files[f"{name}.mcap"] = path.read_bytes()
@@ -126,7 +126,7 @@ def _recordings() -> dict[str, bytes]:
 
 def _tick(row: int) -> Tick:
     scan = _core.Scan(row, row, 0.01 * row, np.full(64, 0.5), np.full(64, 5, np.uint8))
-    given = TickInput(0.01 * row, np.full(6, 0.1 * row), np.eye(4), (scan,), row == 2)
+    inputs = TickInput(0.01 * row, np.full(6, 0.1 * row), np.eye(4), (scan,), row == 2)
     result = TickResult(
         qd=np.full(6, 0.01),
         mode=row,
@@ -136,7 +136,7 @@ def _tick(row: int) -> Tick:
         tasks=(TaskResult("avoidance", (0.1,), (1.0,), (np.nan,)),),
         findings=(Found("sensor_silent", 3, -1, None, 0.2, 2),),
     )
-    return Tick(given, result, TickTruth(0.4, "upper", 0.3, 0))
+    return Tick(inputs, result, TickTruth(0.4, "upper", 0.3, 0))
 
 
 def _stl() -> bytes:

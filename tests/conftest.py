@@ -5,12 +5,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+from browser import Tab, chromium
 
 import proxcgal as px
-from browser import Tab, chromium
 from proxcgal.cli import main
 from proxcgal.study.campaign import Campaign
-from proxcgal.study.kind import Wishes
+from proxcgal.study.kind import CampaignRequest
 from proxcgal.study.static import campaign as static_campaign
 
 SHARED_ROBOTS = Path(__file__).parents[2] / "shared" / "robots"
@@ -82,7 +82,7 @@ def call(
 def planned() -> Campaign:
     """A small campaign: two draws of 0.2 s round one scene, four controllers each."""
     return static_campaign.plan(
-        Wishes(runs=2, seed=0, scenarios=("front_plane",), overrides=("duration=0.2",))
+        CampaignRequest(runs=2, seed=0, scenarios=("front_plane",), overrides=("duration=0.2",))
     )
 
 

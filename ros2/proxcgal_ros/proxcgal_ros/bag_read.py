@@ -53,15 +53,15 @@ def replay_bag(
     """
     content = _Content(bag)
     setup = Setup.of(_scenario(content, bag, scenario, changes))
-    given = list(content.ticks(setup))
-    if not given:
+    inputs = list(content.ticks(setup))
+    if not inputs:
         raise ConfigError(
             f"bag {bag}: no joint states of {setup.robot.name}: "
             f"{topics.JOINT_STATES} with {', '.join(setup.robot.joint_names)} is needed; there are "
             f"{', '.join(sorted(content.topics)) or 'no topics'}"
         )
     name = controller or "wb"
-    law = setup.make_controller(name)
+    ctrl = setup.make_controller(name)
     recorder = None if out is None else Recorder(out)
     results: list[TickResult] = []
     try:
@@ -72,7 +72,7 @@ def replay_bag(
                     meshes=setup.mesh_hashes(),
                 )
             )  # fmt: skip
-        for tick, result in run_ticks(RecordedSource(given), law):
+        for tick, result in run_ticks(RecordedSource(inputs), ctrl):
             results.append(result)
             if recorder is not None:
                 recorder.write(Tick(tick, result, UNKNOWN))
@@ -82,7 +82,7 @@ def replay_bag(
     seen = min(result.seen for result in results)
     return {
         "ticks": len(results),
-        "scans": sum(len(tick.scans) for tick in given),
+        "scans": sum(len(tick.scans) for tick in inputs),
         "seen_min_m": float(seen) if np.isfinite(seen) else None,
         "command_difference": _difference(content.commands, results),
     }
@@ -155,9 +155,9 @@ class _Content:
                 if held is None:
                     held = np.asarray(setup.robot.tool_pose(q))
                 measured = nanoseconds(message.header.stamp) / SECOND
-                given = tuple(scans)
+                inputs = tuple(scans)
                 scans.clear()
-                yield TickInput(now, q, held if goal is None else goal, given, q_stamp=measured)
+                yield TickInput(now, q, held if goal is None else goal, inputs, q_stamp=measured)
             else:
                 for end, rows in rows_of.items():
                     if topic.endswith(end):

@@ -87,28 +87,28 @@ def _messages(read: Recording) -> Iterator[Message]:
     frame = topics.base_frame(setup.robot)
     links = {name: setup.skin.mounts[rows[0]].link for name, rows in arrays.items()}
     names = list(setup.robot.joint_names)
-    start = round(read.ticks[0].given.time * SECOND) if read.ticks else 0
+    start = round(read.ticks[0].inputs.time * SECOND) if read.ticks else 0
     yield _absolute(topics.SCENARIO), start, String(data=read.settings.scenario.to_toml())
     qd = np.zeros(len(names))
     goal: Any = None
     for tick, cloud in _with_clouds(read):
-        given, result = tick.given, tick.result
-        now = round(given.time * SECOND)
-        stamps = [round(scan.stamp * SECOND) for scan in given.scans]
-        for name, scans in scan_messages(given.scans, arrays, stamps).items():
+        inputs, result = tick.inputs, tick.result
+        now = round(inputs.time * SECOND)
+        stamps = [round(scan.stamp * SECOND) for scan in inputs.scans]
+        for name, scans in scan_messages(inputs.scans, arrays, stamps).items():
             told = SensorArray(header=header(now, links[name]), scans=scans)
             yield _absolute(topics.scan_topic(name)), now, told
-        if goal is None or not np.array_equal(goal, given.goal):
-            goal = given.goal
+        if goal is None or not np.array_equal(goal, inputs.goal):
+            goal = inputs.goal
             yield _absolute(topics.GOAL), now, pose_message(goal, header(now, frame))
-        measured = now if given.q_stamp is None else round(given.q_stamp * SECOND)
-        state = joint_message(names, given.q, qd, header(measured, ""))
+        measured = now if inputs.q_stamp is None else round(inputs.q_stamp * SECOND)
+        state = joint_message(names, inputs.q, qd, header(measured, ""))
         yield _absolute(topics.JOINT_STATES), now, state
         qd = result.qd
         yield _absolute(topics.COMMANDS), now, command_message(qd)
         head = header(measured, frame)
         yield _absolute(topics.PROXIMITY), now, proximity_message(result, head)
-        if cloud is not None and given.scans:
+        if cloud is not None and inputs.scans:
             seen = header(max(stamps), frame)
             yield _absolute(topics.CLOUD), now, cloud_message(*cloud, seen)
 
@@ -120,7 +120,7 @@ def _with_clouds(read: Recording) -> Iterator[tuple[Tick, tuple[Any, Any] | None
         return
     again = Replay(read)
     for then, _ in zip(read.ticks, again, strict=True):
-        yield then, (np.asarray(again.law.cloud_W()), np.asarray(again.law.cloud_origins()))
+        yield then, (np.asarray(again.ctrl.cloud_W()), np.asarray(again.ctrl.cloud_origins()))
 
 
 def _absolute(topic: str) -> str:

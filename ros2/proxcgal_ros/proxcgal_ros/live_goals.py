@@ -134,9 +134,9 @@ class LiveGoals:
             self._held = self._tool  # nothing is asked of the tool: it comes to rest
         return self._held
 
-    def after(self, given: TickInput, result: TickResult) -> None:
+    def after(self, inputs: TickInput, result: TickResult) -> None:
         """Whether the goal has ended with this tick."""
-        passed, self._ticked = min(given.time - self._ticked, self._period), given.time
+        passed, self._ticked = min(inputs.time - self._ticked, self._period), inputs.time
         self._last = result
         active = self._goals.active
         if active is None or self._tool is None:
@@ -146,13 +146,13 @@ class LiveGoals:
             reasons = ", ".join(sorted({found.reason for found in result.findings}))
             self._end("aborted", f"the monitor stopped the arm: {reasons}")
         elif active.state == "cancelling":
-            why = self._goals.braked(given.time, passed, result)
+            why = self._goals.braked(inputs.time, passed, result)
             if why is not None:
                 self._end("cancelled", why)
         elif errors[0] <= self.rules.position_tolerance and errors[1] <= self.rules.angle_tolerance:
             self._end("succeeded", "the tool is at the goal")
             self._held = active.T_WT
-        elif given.time - active.begun > self.rules.timeout:
+        elif inputs.time - active.begun > self.rules.timeout:
             told = f"not reached within {self.rules.timeout:g} s"
             if result.activation() > HELD_OFF:
                 told += f": held off by the obstacle, {result.seen:.3f} m away"

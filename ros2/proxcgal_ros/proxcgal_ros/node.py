@@ -66,7 +66,7 @@ class ControllerNode(Node):
         numbers = parameters.declare_numbers(self, values)
         second = parameters.declare_second_goal(self)
         self.setup = self._tuned(setup, numbers)
-        self.law = self.setup.make_controller(controller)
+        self.ctrl = self.setup.make_controller(controller)
         frame = parameters.fixed_text(self, "frame_id", "", "of the robot's base; empty: its name")
         self._frame = frame or topics.base_frame(setup.robot)
         self._clouds, self._told = CloudPace(numbers["cloud_hz"]), Pace(numbers["diagnostics_hz"])
@@ -76,7 +76,7 @@ class ControllerNode(Node):
             second == "preempt",
         )  # fmt: skip
         self._clocks = Clocks(self)
-        self.goals = LiveGoals(setup.robot, self._frame, self._rules, self.law.config.period)
+        self.goals = LiveGoals(setup.robot, self._frame, self._rules, self.ctrl.config.period)
         self.source = RosSource(self, executor, self.setup, self._clocks, self.goals, running)
         self._views = Views(setup.robot, setup.skin)
         self._sensors = [mount.name for mount in setup.skin.mounts]
@@ -128,12 +128,12 @@ class ControllerNode(Node):
             )  # fmt: skip
         mode = 0
         try:
-            for given, result in run_ticks(self.source, self.law):
+            for inputs, result in run_ticks(self.source, self.ctrl):
                 self._last = result
-                self.goals.after(given, result)
-                self._show(given, result)
+                self.goals.after(inputs, result)
+                self._show(inputs, result)
                 if self._recorder is not None:
-                    self._recorder.write(Tick(given, result, UNKNOWN))
+                    self._recorder.write(Tick(inputs, result, UNKNOWN))
                 if result.mode != mode:
                     self._tell_mode(mode, result)
                     mode = result.mode
@@ -158,31 +158,31 @@ class ControllerNode(Node):
             f"mounts: {checks.judged} of {len(checks.sensors)} sensors could be judged, none wrong"
         )
 
-    def _show(self, given: TickInput, result: TickResult) -> None:
+    def _show(self, inputs: TickInput, result: TickResult) -> None:
         """After the command has gone out: what others look at."""
         head = header(self.source.q_stamp_ns, self._frame)
         self._proximity.publish(proximity_message(result, head))
-        if self._clouds.due_with(given.time, self.source.scan_stamps_ns):
+        if self._clouds.due_with(inputs.time, self.source.scan_stamps_ns):
             seen = header(self._clouds.newest_ns, self._frame)
-            origins = np.asarray(self.law.cloud_origins())
-            self._cloud.publish(cloud_message(np.asarray(self.law.cloud_W()), origins, seen))
+            origins = np.asarray(self.ctrl.cloud_origins())
+            self._cloud.publish(cloud_message(np.asarray(self.ctrl.cloud_W()), origins, seen))
             if self._markers.get_subscription_count():
                 shown = [pair_marker(result, head)]
-                if self._viewed.due(given.time):
-                    shown.append(self._views.marker(given.q, head))
+                if self._viewed.due(inputs.time):
+                    shown.append(self._views.marker(inputs.q, head))
                 self._markers.publish(markers(*shown))
-        if self._told.due(given.time):
-            self._diagnose(given.time)
-        if given.goal is not self._goal_told:
-            self._goal_told = given.goal
-            self._goal.publish(pose_message(given.goal, head))
+        if self._told.due(inputs.time):
+            self._diagnose(inputs.time)
+        if inputs.goal is not self._goal_told:
+            self._goal_told = inputs.goal
+            self._goal.publish(pose_message(inputs.goal, head))
 
     def _diagnose(self, time: float) -> None:
         monitor = self.setup.scenario.controller.monitor
         self._diagnostics.publish(
             diagnostics(
                 self.get_name(), self.setup.robot.name, self._last, self._sensors,
-                self.law.scan_ages(time), monitor.degraded_after, monitor.hold_after,
+                self.ctrl.scan_ages(time), monitor.degraded_after, monitor.hold_after,
                 header(self._clocks.now_ns(), ""),
             )
         )  # fmt: skip
@@ -203,7 +203,7 @@ class ControllerNode(Node):
 
     def _reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         del request
-        response.success = bool(self.law.reset())
+        response.success = bool(self.ctrl.reset())
         if response.success:
             response.message = "left STOP"
         elif self._last is None or self._last.mode != STOP:
@@ -227,7 +227,7 @@ class ControllerNode(Node):
         tuning = {key: value for key, value in numbers.items() if key in parameters.TUNING}
         if tuning:
             setup = self._tuned(self.setup, tuning)
-            self.law.retune(setup.make_tasks())
+            self.ctrl.retune(setup.make_tasks())
             self.setup = setup
         for key, pace in (("cloud_hz", self._clouds), ("diagnostics_hz", self._told)):
             if key in numbers:

@@ -10,7 +10,7 @@ _MODULUS = 2**32
 @dataclass(slots=True)
 class _Told:
     raw: int  # last counter as it came
-    given: int  # last counter that was passed on as new
+    inputs: int  # last counter that was passed on as new
     offset: int
     received: float  # [s] of that
     stamp: float  # [s]
@@ -42,18 +42,18 @@ class Restarts:
         if told is None:
             self._told[row] = _Told(raw, raw, 0, now, stamp)
             return raw
-        given = (raw + told.offset) % _MODULUS
-        if not _newer(given, told.given):
+        inputs = (raw + told.offset) % _MODULUS
+        if not _newer(inputs, told.inputs):
             advances = told.refused is not None and _newer(raw, told.refused)
             told.refused = raw
             silent = now - told.received > self._silent_after
             if not (advances and silent and raw != told.raw and stamp > told.stamp):
-                return given
-            told.offset = (told.given + 1 - raw) % _MODULUS
-            given = (raw + told.offset) % _MODULUS
-        told.raw, told.given, told.received, told.stamp = raw, given, now, stamp
+                return inputs
+            told.offset = (told.inputs + 1 - raw) % _MODULUS
+            inputs = (raw + told.offset) % _MODULUS
+        told.raw, told.inputs, told.received, told.stamp = raw, inputs, now, stamp
         told.refused = None
-        return given
+        return inputs
 
 
 def _newer(counter: int, than: int) -> bool:

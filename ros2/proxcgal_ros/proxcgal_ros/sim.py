@@ -23,7 +23,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
-from proxcgal.evaluation.sparse_ground_truth import decisive_truth
+from proxcgal.evaluation.sparse_ground_truth import sparse_ground_truth
 from proxcgal.evaluation.trial_log import NOTHING, TOO_CLOSE, final_ticks
 from proxcgal.scenario.loading import Scenario
 from proxcgal.scenario.setup import Setup
@@ -105,7 +105,7 @@ class SimulatedArm(Node):
         }
         if not self._path:
             return told
-        asked = decisive_truth(
+        asked = sparse_ground_truth(
             self.setup.robot, self.setup.scene, elapsed, np.array(self._path),
             final_ticks(elapsed), under=TOO_CLOSE,
         )  # fmt: skip
@@ -195,14 +195,14 @@ class SimulatedSensors(Node):
         qd = (q - self._q) / (steps * self._period)
         for step in range(steps):
             self._source.command(qd)
-            given = self._source.read()
-            assert given is not None
+            inputs = self._source.read()
+            assert inputs is not None
             if np.isinf(self._world.begin) and np.abs(qd).max() > MOVING:
-                self._world.begin = given.time
-            if given.scans:
+                self._world.begin = inputs.time
+            if inputs.scans:
                 then = stamp - round((steps - 1 - step) * self._period * SECOND)
-                stamps = [then - round((given.time - s.stamp) * SECOND) for s in given.scans]
-                for name, scans in scan_messages(given.scans, self._arrays, stamps).items():
+                stamps = [then - round((inputs.time - s.stamp) * SECOND) for s in inputs.scans]
+                for name, scans in scan_messages(inputs.scans, self._arrays, stamps).items():
                     head = header(int(self.get_clock().now().nanoseconds), self._links[name])
                     self._scans[name].publish(SensorArray(header=head, scans=scans))
         self._q = q

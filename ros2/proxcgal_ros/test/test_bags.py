@@ -47,7 +47,7 @@ def test_a_bag_is_read_back_with_all_messages(
 ) -> None:
     path, counts = bag
     ticks = len(recording.ticks)
-    beats = sum(bool(tick.given.scans) for tick in recording.ticks)
+    beats = sum(bool(tick.inputs.scans) for tick in recording.ticks)
     assert counts == {
         "/scenario": 1, "/goal": 1, "/joint_states": ticks, "/proximity": ticks,
         "/velocity_controller/commands": ticks, "/cloud": beats,
@@ -90,16 +90,16 @@ def test_what_ros_2_reads_in_a_bag_is_what_was_recorded(
     for tick, state, near in zip(
         recording.ticks, told["/joint_states"], told["/proximity"], strict=True
     ):
-        assert list(state.position) == tick.given.q.tolist()
-        assert nanoseconds(state.header.stamp) == round(tick.given.time * 1e9)
+        assert list(state.position) == tick.inputs.q.tolist()
+        assert nanoseconds(state.header.stamp) == round(tick.inputs.time * 1e9)
         assert (near.distance, near.link, near.mode) == (
             tick.result.seen, tick.result.link, tick.result.mode,
         )  # fmt: skip
-    beats = [tick for tick in recording.ticks if tick.given.scans]
+    beats = [tick for tick in recording.ticks if tick.inputs.scans]
     for tick, array, cloud in zip(
         beats, told["/scans/forearm_link/ring2"], told["/cloud"], strict=True
     ):
-        for scan, then in zip(array.scans, tick.given.scans[20:], strict=True):
+        for scan, then in zip(array.scans, tick.inputs.scans[20:], strict=True):
             assert (scan.sensor + 20, scan.counter) == (then.sensor, then.counter)
             np.testing.assert_array_equal(scan.ranges, then.ranges)
             np.testing.assert_array_equal(scan.status, then.status)
@@ -113,7 +113,7 @@ def test_a_bag_replayed_through_the_controller_gives_the_recorded_commands(
     out = tmp_path / "again.mcap"
     told = replay_bag(bag[0], out=out)
     assert told["ticks"] == len(recording.ticks)
-    assert told["scans"] == sum(len(tick.given.scans) for tick in recording.ticks)
+    assert told["scans"] == sum(len(tick.inputs.scans) for tick in recording.ticks)
     # Stamps are whole nanoseconds in a bag: no more than that is between them.
     assert told["command_difference"] < 1e-6
     least = min(tick.result.seen for tick in recording.ticks)

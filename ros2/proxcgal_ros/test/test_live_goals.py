@@ -19,7 +19,7 @@ class Arm:
 
     def __init__(self, *changes: str) -> None:
         self.setup = Setup.of(load_scenario("front_plane", changes))
-        self.law = self.setup.make_controller("wb_known", 0)
+        self.ctrl = self.setup.make_controller("wb_known", 0)
         self.goals = LiveGoals(self.setup.robot, "base_link", Rules(timeout=8.0), PERIOD)
         self.q, self.qd, self.time = self.setup.q0.copy(), np.zeros(6), 5.0
         self.random = np.random.default_rng(0)
@@ -30,7 +30,7 @@ class Arm:
         self.time += step
         self.q = self.q + step * self.qd
         T_WT = self.goals.at(self.time, self.q)
-        out = self.law.tick_known(self.time, self.q, np.zeros((0, 3)), T_WT)
+        out = self.ctrl.tick_known(self.time, self.q, np.zeros((0, 3)), T_WT)
         self.qd = np.array(out.qd)
         self.goals.after(TickInput(self.time, self.q, T_WT), TickResult.of(out, 0, 0.0))
 

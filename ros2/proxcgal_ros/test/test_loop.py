@@ -69,8 +69,8 @@ def test_front_plane_over_ros_keeps_the_gain_of_the_direct_loop(
     # between two joint states and made a tick of their own. How many do is the machine's affair
     # (test_source.py scripts them).
     ticks = read_recording(tmp_path / "wb.mcap").ticks
-    times = np.array([tick.given.time for tick in ticks])
-    stamps = np.array([tick.given.q_stamp for tick in ticks])
+    times = np.array([tick.inputs.time for tick in ticks])
+    stamps = np.array([tick.inputs.q_stamp for tick in ticks])
     early = np.flatnonzero(np.diff(stamps) == 0.0) + 1
     commands = np.array([tick.result.qd for tick in ticks])
     period = 1.0 / setup.scenario.simulation.control_hz
@@ -79,7 +79,7 @@ def test_front_plane_over_ros_keeps_the_gain_of_the_direct_loop(
     assert np.all(np.abs(np.diff(commands, axis=0)) <= most * (1.0 + 1e-5))
     # The arm was carried on by what its joint state told: the velocity of a command before it.
     # Which one is the machine's affair too.
-    q = np.array([tick.given.q for tick in ticks])
+    q = np.array([tick.inputs.q for tick in ticks])
     for row in early:
         of_state = np.flatnonzero(stamps[:row] == stamps[row])[0]  # its own tick
         ahead = min(times[row] - stamps[row], OVERDUE * period)

@@ -131,9 +131,9 @@ def test_a_killed_sensor_publisher_brings_hold_within_200_ms(
     # By the node's own clock, the machine's: no matter when this process heard of it. A scan that
     # was sent before the kill may have been taken after it, where the node stood still.
     assert processes.end("node") == 0
-    ticks = [tick for tick in read_recording(record).ticks if tick.given.time < began]
-    scans = max(tick.given.time for tick in ticks if tick.given.scans)
-    late = [t for t in ticks if t.given.time > max(killed, scans) + 0.2]
+    ticks = [tick for tick in read_recording(record).ticks if tick.inputs.time < began]
+    scans = max(tick.inputs.time for tick in ticks if tick.inputs.scans)
+    late = [t for t in ticks if t.inputs.time > max(killed, scans) + 0.2]
     assert late
     assert {tick.result.mode for tick in late} == {Proximity.HOLD}
     reasons = {found.reason for tick in late for found in tick.result.findings}
@@ -176,7 +176,7 @@ def test_joint_states_that_stop_hold_the_arm_and_then_stop_it(
     assert processes.end("node") == 0
     ticks = read_recording(record).ticks
     stopped = next(row for row, tick in enumerate(ticks) if tick.result.mode == Proximity.STOP)
-    ages = [tick.given.time - tick.given.q_stamp for tick in ticks[: stopped + 1]]
+    ages = [tick.inputs.time - tick.inputs.q_stamp for tick in ticks[: stopped + 1]]
     assert max(ages[:-1]) <= stop < ages[-1]
     held = [t for t, age in zip(ticks[:stopped], ages, strict=False) if age > hold]
     assert {tick.result.mode for tick in held} <= {Proximity.HOLD}
@@ -255,7 +255,7 @@ def test_sensors_that_sit_elsewhere_end_the_node_before_it_commands(
 
 
 @pytest.mark.parametrize(
-    ("given", "told"),
+    ("inputs", "told"),
     [
         ("d_min:=5.0", "d_min = 5.0: must be a number with a point, such as 0.2, from 0.02 to 1"),
         ("d_min:=1", "d_min = 1: must be a number with a point"),
@@ -266,16 +266,16 @@ def test_sensors_that_sit_elsewhere_end_the_node_before_it_commands(
     ],
 )
 def test_a_parameter_that_cannot_be_ends_the_node_with_a_line(
-    processes: Processes, given: str, told: str
+    processes: Processes, inputs: str, told: str
 ) -> None:
-    assert processes.start("node", "node", "--ros-args", "-p", given).wait(PATIENCE) == 2
+    assert processes.start("node", "node", "--ros-args", "-p", inputs).wait(PATIENCE) == 2
     assert f"error: parameter {told}" in processes.said("node")
     assert "Traceback" not in processes.said("node")
 
 
 def test_a_parameter_that_the_node_does_not_know_is_told(processes: Processes) -> None:
-    given = ("-p", "d_mim:=0.3", "-p", "second_goal:=preempt")
-    processes.start("node", "node", "--ros-args", *given)
+    inputs = ("-p", "d_mim:=0.3", "-p", "second_goal:=preempt")
+    processes.start("node", "node", "--ros-args", *inputs)
     told = "parameter d_mim: not known, it changes nothing; did you mean d_min?"
     end = time.monotonic() + PATIENCE
     while told not in processes.said("node") and time.monotonic() < end:

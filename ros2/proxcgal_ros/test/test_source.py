@@ -86,8 +86,8 @@ class Script:
             lambda: self.time < self._until,
         )  # fmt: skip
         found = []
-        while (given := source.read()) is not None:
-            found.append(given)
+        while (inputs := source.read()) is not None:
+            found.append(inputs)
         return found
 
 

@@ -124,7 +124,7 @@ def campaign_command(options: CampaignOptions, command: str) -> int:
     from proxcgal.report.report import write_report
     from proxcgal.study.campaign_picture import show_moving
     from proxcgal.study.figures import png
-    from proxcgal.study.kind import Wishes
+    from proxcgal.study.kind import CampaignRequest
     from proxcgal.study.store import Store
     from proxcgal.study.table import parquet, tidy
     from proxcgal.study.workers import Pool, default_workers
@@ -133,15 +133,15 @@ def campaign_command(options: CampaignOptions, command: str) -> int:
     begin = clock.monotonic()
     workers, kept = checked_workers(options.workers), _kept(options)
     kind: Kind = import_module(KINDS[options.kind]).KIND
-    given = options.runs if options.subjects is None else options.subjects
-    runs = kind.runs if given is None else given
-    wishes = Wishes(
+    inputs = options.runs if options.subjects is None else options.subjects
+    runs = kind.runs if inputs is None else inputs
+    request = CampaignRequest(
         runs=runs, seed=options.seed, scenarios=options.scenario,
         overrides=tuple(flat(options.set)), controllers=tuple(dict.fromkeys(options.controller)),
         jitter=not options.no_jitter,
     )  # fmt: skip
     announce("drawing scenes (a robot's first time takes a while)", quiet=options.quiet)
-    campaign = kind.plan(wishes)
+    campaign = kind.plan(request)
     _check(campaign)
     workers = workers or default_workers(len(campaign.trials))
     folder = options.out or Path("out") / f"campaign-{options.kind}"

@@ -51,7 +51,7 @@ def coverage_command(options: CoverageOptions, command: str) -> int:
     from proxcgal.core.errors import ConfigError
     from proxcgal.core.progress import Progress, announce
     from proxcgal.evaluation.blind_volume import REACH_M, blind_volume
-    from proxcgal.evaluation.ground_truth import Truth
+    from proxcgal.evaluation.ground_truth import GroundTruth
     from proxcgal.evaluation.metrics import coverage_lines, finite, write_bytes, write_json
     from proxcgal.scenario.loading import load_scenario
     from proxcgal.scenario.setup import Setup
@@ -88,7 +88,7 @@ def coverage_command(options: CoverageOptions, command: str) -> int:
     ticks = list(range(tick, -1, -step))[::-1]
     stamps, postures = [float(log.elapsed[t]) for t in ticks], [log.q[t] for t in ticks]
     volume = blind_volume(setup, stamps, postures)
-    closest = Truth(setup.robot, setup.scene).nearest(log.q[tick], stamps[-1])
+    closest = GroundTruth(setup.robot, setup.scene).nearest(log.q[tick], stamps[-1])
     memory_s = scenario.controller.memory.memory_s
     figure = coverage_figure(
         setup, stamps, postures, volume, nearest_W=closest.obstacle_W,

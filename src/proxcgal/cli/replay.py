@@ -229,14 +229,14 @@ def _row_at(recording: Recording, time: float) -> int:
 
 def _show_tick(tick: Tick, elapsed: float) -> None:
     """Everything of one tick, `elapsed` after the first [s]."""
-    given, result, truth = tick.given, tick.result, tick.truth
-    sensors = ", ".join(str(scan.sensor) for scan in given.scans)
+    inputs, result, truth = tick.inputs, tick.result, tick.truth
+    sensors = ", ".join(str(scan.sensor) for scan in inputs.scans)
     rows = [
-        ("time", f"{elapsed:.4f} s{', late' if given.late else ''}"),
-        *([("clock", f"{given.time:.4f} s")] if abs(given.time - elapsed) > 1e-3 else []),
-        ("q", _vector(given.q)),
-        ("goal", _vector(given.goal[:3, 3])),
-        ("scans", sensors or ("known points" if given.known else "none")),
+        ("time", f"{elapsed:.4f} s{', late' if inputs.late else ''}"),
+        *([("clock", f"{inputs.time:.4f} s")] if abs(inputs.time - elapsed) > 1e-3 else []),
+        ("q", _vector(inputs.q)),
+        ("goal", _vector(inputs.goal[:3, 3])),
+        ("scans", sensors or ("known points" if inputs.known else "none")),
         ("cloud", f"{result.cloud_points} points"),
         ("seen", f"{_metres(result.seen).strip()} {result.link}"),
         ("true", f"{_metres(truth.distance).strip()} {truth.link}"),

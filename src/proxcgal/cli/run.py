@@ -152,8 +152,8 @@ def overrides(options: RunOptions) -> list[str]:
         path = Path(options.robot).expanduser()
         is_file = is_robot_file(path)
         changes.append("robot=" + json.dumps(str(path.absolute()) if is_file else options.robot))
-    given = flat(options.package_dir, "--package-dir")
-    folders = [str(path.expanduser().absolute()) for path in given]
+    inputs = flat(options.package_dir, "--package-dir")
+    folders = [str(path.expanduser().absolute()) for path in inputs]
     if folders:
         changes.append("package_dirs=" + json.dumps(folders))
     if options.subject is not None:

@@ -144,7 +144,7 @@ def _attend(page: LivePage) -> None:
 
     def listen() -> None:
         for _ in sys.stdin:
-            page.desk.want(anew=True)
+            page.queue.want(anew=True)
 
     threading.Thread(target=listen, daemon=True).start()
     page.wait()

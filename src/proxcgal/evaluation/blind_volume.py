@@ -12,7 +12,7 @@ from proxcgal import _core
 from proxcgal.core.errors import ConfigError
 from proxcgal.core.transforms import inverse, placed
 from proxcgal.core.typing import Array
-from proxcgal.evaluation.visibility import Eyes
+from proxcgal.evaluation.visibility import Visibility
 
 if TYPE_CHECKING:
     from proxcgal.models import Robot
@@ -80,7 +80,7 @@ def last_seen(
             f"coverage: {len(stamps)} stamps and {len(postures)} postures: as many of one as of "
             "the other, and at least one"
         )
-    eyes = Eyes(setup, None)
+    visibility = Visibility(setup, None)
     seen = np.full(len(points_W), -np.inf)
     for stamp, posture in sorted(
         zip(stamps, postures, strict=True), key=lambda pair: pair[0], reverse=True
@@ -88,7 +88,7 @@ def last_seen(
         rows = np.flatnonzero(np.isinf(seen))
         if not len(rows):
             break
-        seen[rows[eyes.see(posture, points_W[rows])]] = stamp
+        seen[rows[visibility.see(posture, points_W[rows])]] = stamp
     return seen
 
 

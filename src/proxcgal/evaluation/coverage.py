@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from proxcgal.core.transforms import inverse, placed
 from proxcgal.core.typing import Array
-from proxcgal.evaluation.ground_truth import Truth
-from proxcgal.evaluation.visibility import Eyes
+from proxcgal.evaluation.ground_truth import GroundTruth
+from proxcgal.evaluation.visibility import Visibility
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -80,7 +80,7 @@ def sightings(setup: Setup, q: Array, elapsed: Array, ticks: Sequence[int]) -> t
     scan_s = 1.0 / setup.scenario.simulation.sensor_hz
     rows = np.asarray(ticks, np.intp)
     moments, postures = elapsed[rows], q[rows]
-    truth, names = Truth(setup.robot, setup.measured), list(setup.measured.names)
+    truth, names = GroundTruth(setup.robot, setup.measured), list(setup.measured.names)
     solids = np.zeros(len(moments), np.intp)
     points_O = np.zeros((len(moments), 3))  # on their solids, which may move
     for row, (moment, posture) in enumerate(zip(moments, postures, strict=True)):
@@ -110,7 +110,7 @@ def _last_seen(
 ) -> Array:
     """(n,) [s] stamp of the last scan up to each moment that had its point in view, -inf: none."""
     scan_s = 1.0 / setup.scenario.simulation.sensor_hz
-    eyes = Eyes(setup, setup.scene)
+    visibility = Visibility(setup, setup.scene)
     seen = np.full(len(moments), -np.inf)
     for scan in range(int(np.floor(moments[-1] / scan_s + 1e-9)), -1, -1):
         stamp = scan * scan_s
@@ -120,5 +120,5 @@ def _last_seen(
         posture = np.array([np.interp(stamp, elapsed, joint) for joint in q.T])
         T_WO = setup.measured.poses(stamp)[solids[open_rows]]
         points_W = np.einsum("nij,nj->ni", T_WO[:, :3, :3], points_O[open_rows]) + T_WO[:, :3, 3]
-        seen[open_rows[eyes.see(posture, points_W, stamp)]] = stamp
+        seen[open_rows[visibility.see(posture, points_W, stamp)]] = stamp
     return seen

@@ -37,7 +37,7 @@ class TrueDistances(NamedTuple):
 NOT_ASKED = TrueDistances(np.nan, "", np.nan)
 
 
-class Truth:
+class GroundTruth:
     """How near one robot comes to the scene and to itself, tick after tick."""
 
     def __init__(self, robot: Robot, scene: Scene) -> None:

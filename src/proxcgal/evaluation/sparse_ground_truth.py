@@ -28,7 +28,7 @@ NEAR_TICKS = 25
 
 
 @dataclass(frozen=True, slots=True)
-class DecisiveTruth:
+class SparseTruth:
     """True distances over n ticks."""
 
     distance: Array  #: (n,) [m] robot to scene, inf without a scene; nan: not asked
@@ -36,9 +36,9 @@ class DecisiveTruth:
     own: Array  #: (n,) [m] between the robot's own links, inf without pairs; nan: not asked
 
 
-def decisive_truth(
+def sparse_ground_truth(
     robot: Robot, scene: Scene, time: Array, q: Array, wanted: Bools, under: float
-) -> DecisiveTruth:
+) -> SparseTruth:
     """Distances to the scene and between own links, as `Truth` has them, where they decide.
 
     Args:
@@ -66,7 +66,7 @@ def decisive_truth(
     own.ask_least(0.0)
     names = robot.link_names
     link = [names[apart.links[row]] if row >= 0 else "" for row in apart.nearest]
-    return DecisiveTruth(apart.distance, link, own.distance)
+    return SparseTruth(apart.distance, link, own.distance)
 
 
 def half_box(solid: Solid) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 from proxcgal.core.modes import HOLD
 from proxcgal.core.transforms import inverse
 from proxcgal.core.typing import Array
-from proxcgal.evaluation.termination import Ending, Holding, pose_errors
+from proxcgal.evaluation.termination import Ending, StallCause, pose_errors
 from proxcgal.models.macro_micro import tool_jacobian
 from proxcgal.scenario.setup import Setup
 from proxcgal.sim.tick import TickResult
@@ -19,7 +19,9 @@ _SETTLED = 80  # ticks at one posture after which a command has reached what it 
 _FREES = 0.01  # [m/s] or [rad/s] towards the goal: less is no way out
 
 
-def what_holds(setup: Setup, q: Array, points_W: Array, last: TickResult, time: float) -> Holding:
+def stall_cause(
+    setup: Setup, q: Array, points_W: Array, last: TickResult, time: float
+) -> StallCause:
     """Leaves each task out in turn: the one that frees most of the way to the goal holds the arm.
 
     Every variant is asked at the same posture and on the same points, until its command has come
@@ -42,8 +44,8 @@ def what_holds(setup: Setup, q: Array, points_W: Array, last: TickResult, time: 
     }
     task = max(freed, key=lambda name: freed[name], default="")
     if not task or freed[task] < _FREES:
-        return Holding()
-    found = Holding(task=task, freed=freed[task])
+        return StallCause()
+    found = StallCause(task=task, freed=freed[task])
     if task == "avoidance":
         return replace(
             found, link=out.control_link, obstacle=_nearest_obstacle(setup, out, time),
@@ -72,7 +74,7 @@ def concluded(
     """
     if ending.outcome == "succeeded":
         return ending
-    holding = what_holds(setup, q, points_W, last, time)
+    holding = stall_cause(setup, q, points_W, last, time)
     metres, radians = pose_errors(np.asarray(setup.robot.tool_pose(q)), setup.goal)
     words = [f"{holding}", f"{ending.reason}, {metres:.3f} m and {radians:.3f} rad remain"]
     if last.mode >= HOLD:
@@ -82,18 +84,18 @@ def concluded(
 
 
 def _without(setup: Setup, task: str) -> Setup:
-    law = setup.scenario.controller
-    left = tuple(name for name in law.levels if name != task)
-    law = law.model_copy(update={"tasks": left, "off": ()})
-    return replace(setup, scenario=setup.scenario.model_copy(update={"controller": law}))
+    settings = setup.scenario.controller
+    left = tuple(name for name in settings.levels if name != task)
+    settings = settings.model_copy(update={"tasks": left, "off": ()})
+    return replace(setup, scenario=setup.scenario.model_copy(update={"controller": settings}))
 
 
 def _towards(setup: Setup, q: Array, goal: Array, points_W: Array) -> tuple[float, Any]:
     """How fast the tool would go towards the goal, and the controller's last answer."""
-    law = setup.make_controller("wb_known", len(points_W))
+    settings = setup.make_controller("wb_known", len(points_W))
     points_W = np.ascontiguousarray(points_W, np.float64)
     for tick in range(_SETTLED):
-        out = law.tick_known(tick * law.config.period, q, points_W, goal)
+        out = settings.tick_known(tick * settings.config.period, q, points_W, goal)
     velocity = tool_jacobian(setup.robot, q) @ out.qd
     T_WT = np.asarray(setup.robot.tool_pose(q))
     ahead_W = goal[:3, 3] - T_WT[:3, 3]

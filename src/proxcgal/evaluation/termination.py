@@ -14,7 +14,7 @@ Outcome = Literal["succeeded", "aborted", "cancelled"]
 
 
 @dataclass(frozen=True, slots=True)
-class Holding:
+class StallCause:
     """What keeps the arm from its goal."""
 
     task: str = ""  #: "" where no single task does
@@ -47,7 +47,7 @@ class Ending:
 
     outcome: Outcome
     reason: str
-    holding: Holding | None = None
+    holding: StallCause | None = None
 
 
 class GoalWatch:

@@ -76,12 +76,12 @@ class TrialLog:
         ending: Ending | None = None,
     ) -> TrialLog:
         """Puts ticks together; without `elapsed` the caller's clock is believed."""
-        given = [tick.given for tick in ticks]
+        inputs = [tick.inputs for tick in ticks]
         results = [tick.result for tick in ticks]
         truths = [tick.truth for tick in ticks]
-        time = np.array([g.time for g in given])
-        tools = np.array([_tool(robot, g.q) for g in given]).reshape(-1, 4, 4)
-        goals = np.array([g.goal for g in given]).reshape(-1, 4, 4)
+        time = np.array([g.time for g in inputs])
+        tools = np.array([_tool(robot, g.q) for g in inputs]).reshape(-1, 4, 4)
+        goals = np.array([g.goal for g in inputs]).reshape(-1, 4, 4)
         found = Counter(
             reason for r in results for reason in sorted({f.reason for f in r.findings})
         )
@@ -93,7 +93,7 @@ class TrialLog:
             wall_s=wall_s,
             time=time,
             elapsed=time if elapsed is None else elapsed,
-            q=np.array([g.q for g in given]).reshape(-1, robot.n_q),
+            q=np.array([g.q for g in inputs]).reshape(-1, robot.n_q),
             qd=np.array([r.qd for r in results]).reshape(-1, robot.n_q),
             seen_m=np.array([r.seen for r in results]),
             true_m=np.array([t.distance for t in truths]),

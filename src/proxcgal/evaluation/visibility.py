@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 _BEFORE_M = 0.005  # a ray that ends so little before a point on a surface has reached it
 
 
-class Eyes:
+class Visibility:
     """The fields of view of all sensors, as far as robot and scene leave them free.
 
     A point is in view where a straight line from some sensor reaches it, inside the field of view

@@ -32,16 +32,16 @@ def encode(tick: Tick, before: int) -> bytes:
         tick: what to write.
         before: CRC-32 of all bytes of the file so far.
     """
-    given, result, truth = tick.given, tick.result, tick.truth
+    inputs, result, truth = tick.inputs, tick.result, tick.truth
     content = {
         "before": before,
-        "time": given.time,
-        "q": given.q.tolist(),
-        "goal": given.goal.ravel().tolist(),
-        "known": given.known,
-        "late": given.late,
-        "q_stamp": given.q_stamp,
-        "scans": base64.b64encode(pack_scans(given.scans)).decode(),
+        "time": inputs.time,
+        "q": inputs.q.tolist(),
+        "goal": inputs.goal.ravel().tolist(),
+        "known": inputs.known,
+        "late": inputs.late,
+        "q_stamp": inputs.q_stamp,
+        "scans": base64.b64encode(pack_scans(inputs.scans)).decode(),
         "qd": result.qd.tolist(),
         "mode": result.mode,
         "seen_m": result.seen,
@@ -85,7 +85,7 @@ def decode(data: bytes) -> tuple[Tick, int]:
     if not mark or crc != b"%d}" % zlib.crc32(body):
         raise ValueError("its checksum does not fit")
     content = json.loads(data)
-    given = TickInput(
+    inputs = TickInput(
         time=float(content["time"]),
         q=_array(content["q"]),
         goal=_array(content["goal"]).reshape(4, 4),
@@ -125,7 +125,7 @@ def decode(data: bytes) -> tuple[Tick, int]:
     truth = TickTruth(
         float(content["true_m"]), content["true_link"], float(content["self_m"]), content["leaked"]
     )
-    return Tick(given, result, truth), content["before"]
+    return Tick(inputs, result, truth), content["before"]
 
 
 def pack_scans(scans: Sequence[_core.Scan]) -> bytes:

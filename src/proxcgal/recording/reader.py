@@ -16,6 +16,7 @@ from mcap.records import Attachment, Channel, DataEnd, Footer, Header, Message, 
 from mcap.writer import MCAP0_MAGIC
 
 from proxcgal.core.errors import ConfigError, RecordingError
+from proxcgal.core.typing import Array
 from proxcgal.recording import codec
 from proxcgal.recording.foxglove import nanoseconds
 from proxcgal.recording.writer import (
@@ -24,7 +25,6 @@ from proxcgal.recording.writer import (
     PROFILE,
     SETTINGS,
     TICKS,
-    Array,
     Recorder,
     Settings,
     settings_crc,
@@ -55,7 +55,7 @@ class Recording:
         Where that clock jumps, as a fault makes it, a period counts instead. Of a recording that
         holds ticks with scans only, the run's own time.
         """
-        times: Array = np.array([tick.given.time for tick in self.ticks])
+        times: Array = np.array([tick.inputs.time for tick in self.ticks])
         if self.settings.ticks != "all":
             return times
         if len(times) < 2:
@@ -71,7 +71,7 @@ class Recording:
         """(n_q,) of each tick, to draw: the last finite one where a joint state is no number."""
         q = np.array(self.settings.scenario.start()[1])
         for tick in self.ticks:
-            q = tick.given.q if np.isfinite(tick.given.q).all() else q
+            q = tick.inputs.q if np.isfinite(tick.inputs.q).all() else q
             yield q
 
 
@@ -193,7 +193,7 @@ class _Contents:
                 tick, before = codec.decode(message.data)
                 if before != crc:
                     raise ValueError("something between it and the tick before it was changed")
-                stamp = nanoseconds(tick.given.time)
+                stamp = nanoseconds(tick.inputs.time)
                 if (message.log_time, message.publish_time) != (stamp, stamp):
                     raise ValueError("its head was changed")
                 self._ticks.append(tick)
@@ -244,5 +244,5 @@ class _Contents:
     def _so_far(self) -> str:
         if not self._ticks:
             return ", before the first tick"
-        lasts = self._ticks[-1].given.time - self._ticks[0].given.time
+        lasts = self._ticks[-1].inputs.time - self._ticks[0].inputs.time
         return f", after {len(self._ticks)} ticks up to {lasts:.3f} s"

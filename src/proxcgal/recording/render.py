@@ -31,7 +31,7 @@ _ASIDE, _DOWN = -1.05, -0.38  # [rad] of the view against the obstacle's directi
 
 
 @dataclass(frozen=True)
-class Snapshot:
+class RecordedMoment:
     """What one tick looked like from inside the controller."""
 
     tick: Tick
@@ -41,9 +41,9 @@ class Snapshot:
     q: Array  #: (n_q,) where the arm was
 
 
-def snapshots(
+def recorded_moments(
     recording: Recording, times: Sequence[float], controller: str | None = None
-) -> list[Snapshot]:
+) -> list[RecordedMoment]:
     """What the controller held at each of these times.
 
     Args:
@@ -53,14 +53,16 @@ def snapshots(
     """
     if not recording.ticks:
         raise ConfigError(f"recording {recording.path}: has no ticks to draw")
-    rows = np.searchsorted([tick.given.time for tick in recording.ticks], times)
+    rows = np.searchsorted([tick.inputs.time for tick in recording.ticks], times)
     wanted = np.minimum(rows, len(recording.ticks) - 1).tolist()
     replay = Replay(recording, controller)
     taken = {}
     for row, (tick, q) in enumerate(zip(replay, recording.postures(), strict=True)):
         if row in wanted:
-            elapsed = row * replay.law.config.period
-            taken[row] = Snapshot(tick, replay.law.cloud_W(), replay.law.raw_cloud_W(), elapsed, q)
+            elapsed = row * replay.ctrl.config.period
+            taken[row] = RecordedMoment(
+                tick, replay.ctrl.cloud_W(), replay.ctrl.raw_cloud_W(), elapsed, q
+            )
         if row >= max(wanted, default=-1):
             break
     return [taken[row] for row in wanted]
@@ -82,7 +84,7 @@ def viewpoint(setup: Setup) -> Camera:
 
 def draw(
     world: World,
-    snapshot: Snapshot,
+    snapshot: RecordedMoment,
     size: tuple[int, int] = (640, 480),
     camera: Camera | None = None,
 ) -> Picture:
@@ -114,7 +116,7 @@ def animate(
         ConfigError: the file cannot be written.
         SimulationError: nothing can draw here.
     """
-    end = recording.ticks[-1].given.time if recording.ticks else 0.0
+    end = recording.ticks[-1].inputs.time if recording.ticks else 0.0
     times = np.arange(0.0, min(end, seconds or end) + 1e-9, 1.0 / fps)
     replay = Replay(recording)
     scenario = replay.setup.scenario
@@ -122,7 +124,7 @@ def animate(
     try:
         frames = [
             Image.fromarray(draw(world, snapshot, size, camera or viewpoint(replay.setup)))
-            for snapshot in snapshots(recording, times.tolist())
+            for snapshot in recorded_moments(recording, times.tolist())
         ]
     finally:
         world.close()
@@ -158,8 +160,8 @@ def write_gif(frames: Sequence[Image.Image], path: Path, fps: float) -> None:
         raise ConfigError(f"picture {path}: cannot be written: {error.strerror or error}") from None
 
 
-def _marks(snapshot: Snapshot) -> Iterator[Spheres | Arrow]:
-    result, goal = snapshot.tick.result, snapshot.tick.given.goal
+def _marks(snapshot: RecordedMoment) -> Iterator[Spheres | Arrow]:
+    result, goal = snapshot.tick.result, snapshot.tick.inputs.goal
     yield Spheres(without(snapshot.raw_W, snapshot.cloud_W), 0.005, _RAW)
     yield Spheres(snapshot.cloud_W, 0.008, _FILTERED)
     if result.control_W is not None and result.obstacle_W is not None:

@@ -65,20 +65,20 @@ class Replay:
         if self.setup.uses_known_points(self.controller):
             recorded = settings.known_points_W
             self._known = self.setup.known_cloud() if recorded is None else FixedCloud(recorded)
-        elif any(tick.given.known for tick in recording.ticks):
+        elif any(tick.inputs.known for tick in recording.ticks):
             raise ConfigError(
                 f"recording {recording.path}: was made on known points and holds no scans, which "
                 f"controller {self.controller!r} needs; wb_known does not"
             )
         room = 0 if self._known is None else len(self._known)
-        self.law = self.setup.make_controller(self.controller, room)
+        self.ctrl = self.setup.make_controller(self.controller, room)
 
     def __iter__(self) -> Iterator[Tick]:
         """Ticks with the new answers; `law` then holds the state after the yielded one."""
-        given = [
-            replace(tick.given, known=self._known is not None) for tick in self.recording.ticks
+        inputs = [
+            replace(tick.inputs, known=self._known is not None) for tick in self.recording.ticks
         ]
-        ticks = run_ticks(RecordedSource(given), self.law, None, self._known)
+        ticks = run_ticks(RecordedSource(inputs), self.ctrl, None, self._known)
         for then, (given_now, result) in zip(self.recording.ticks, ticks, strict=True):
             yield Tick(given_now, result, then.truth)
 

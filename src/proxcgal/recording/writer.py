@@ -95,7 +95,7 @@ class Recorder(Closing):
         if self.failure is None:
             try:
                 data = codec.encode(tick, self._stream.crc)
-                self._message(TICKS, tick.given.time, data)
+                self._message(TICKS, tick.inputs.time, data)
                 self._stream.flush()
             except OSError as error:
                 self._fail(error)

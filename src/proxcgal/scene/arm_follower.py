@@ -14,7 +14,7 @@ _STRETCHED = 0.999  # of both lengths: an arm is never quite straight
 
 
 @dataclass(frozen=True, slots=True)
-class Arm:
+class ArmFollower:
     """Rows of three capsules, their z axes towards the shoulder, and their lengths [m]."""
 
     hand_name: str
@@ -52,7 +52,7 @@ class Arm:
         _span(poses[self.fore], wrist, elbow)
 
 
-def arms(names: Sequence[str], solids: Sequence[Solid]) -> list[Arm]:
+def arm_followers(names: Sequence[str], solids: Sequence[Solid]) -> list[ArmFollower]:
     """The arms that these capsules make: `SIDE_upper_arm`, `SIDE_forearm`, `SIDE_hand`."""
     found = []
     for name in names:
@@ -64,7 +64,7 @@ def arms(names: Sequence[str], solids: Sequence[Solid]) -> list[Arm]:
         capsules = [solid for row in rows if isinstance(solid := solids[row], Capsule)]
         if len(capsules) == len(rows):
             upper, fore, hand = (capsule.length for capsule in capsules)
-            found.append(Arm(name, rows[0], rows[1], rows[2], (upper, fore, hand)))
+            found.append(ArmFollower(name, rows[0], rows[1], rows[2], (upper, fore, hand)))
     return found
 
 

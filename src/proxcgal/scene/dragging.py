@@ -7,14 +7,14 @@ from collections.abc import Mapping
 import numpy as np
 
 from proxcgal.core.typing import Array
-from proxcgal.scene.arm_follower import arms
+from proxcgal.scene.arm_follower import arm_followers
 from proxcgal.scene.obstacles import Scene
 from proxcgal.scene.solids import Solid
 
 SPEED = 1.0  #: [m/s] at most, of a solid that a hand moves
 
 
-class Hands:
+class DraggedSolids:
     """Solids that somebody holds, by name; each goes where it is wanted, no faster than a bound."""
 
     def __init__(self, speed: float = SPEED) -> None:
@@ -70,12 +70,12 @@ class LiveScene:
 
     still = False
 
-    def __init__(self, scene: Scene, hands: Hands, since: float = 0.0) -> None:
+    def __init__(self, scene: Scene, hands: DraggedSolids, since: float = 0.0) -> None:
         """Args: the scene's own time begins at `since` [s]."""
         self._scene = scene
         self._hands = hands
         self._since = since
-        self._arms = arms(scene.names, scene.solids)
+        self._arms = arm_followers(scene.names, scene.solids)
 
     @property
     def names(self) -> tuple[str, ...]:

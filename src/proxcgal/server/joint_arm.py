@@ -30,7 +30,7 @@ class JointArm:
         self.last: TickResult | None = None  #: of the controller's last tick
         self._cloud = self.setup.known_cloud()
         self._ticks = 0
-        self.law = self._made()
+        self.ctrl = self._made()
         self._held = self.tool
 
     @property
@@ -48,7 +48,7 @@ class JointArm:
     @property
     def period(self) -> float:
         """[s] from tick to tick."""
-        return float(self.law.config.period)
+        return float(self.ctrl.config.period)
 
     @property
     def tool(self) -> Array:
@@ -82,12 +82,12 @@ class JointArm:
         changes = [f"controller.{k}={list(v)!r}" for k, v in (("tasks", tasks), ("off", off))]
         changed = change_scenario(self.setup.scenario, "tasks", changes)
         self.setup = replace(self.setup, scenario=changed)
-        self.law = self._made()
-        self.law.go_on_from(self.qd)  # the arm may still come to rest after its last goal
+        self.ctrl = self._made()
+        self.ctrl.go_on_from(self.qd)  # the arm may still come to rest after its last goal
 
     def reset(self) -> bool:
         """Leaves a STOP of the monitor; False while its cause lasts, and where there is none."""
-        left = bool(self.law.reset())
+        left = bool(self.ctrl.reset())
         if left:
             self.last = None  # it still says STOP
         return left
@@ -96,7 +96,7 @@ class JointArm:
         """Puts it into a configuration, at rest, as [JR] does with its simulation."""
         self.q = np.array(self.scenario.configurations[configuration])
         self.qd = np.zeros_like(self.q)
-        self.law = self._made()
+        self.ctrl = self._made()
 
     def follow(self, T_WT: Array) -> None:
         """A goal (4, 4) for the ticks that follow one."""
@@ -115,7 +115,7 @@ class JointArm:
         cloud, now = self._cloud, self._ticks * self.period
         velocity_W = None if cloud.still else cloud.velocities(self.time)
         goal = self.setup.goal if following else self._held
-        out = self.law.tick_known(now, self.q, cloud(self.time), goal, velocity_W)
+        out = self.ctrl.tick_known(now, self.q, cloud(self.time), goal, velocity_W)
         self._ticks += 1
         self.time += self.period
         self.last = TickResult.of(out, 0, 0.0)
@@ -124,8 +124,8 @@ class JointArm:
     def asked(self) -> tuple[Tick, Array]:
         """The last tick, and the points (n, 3) that it would be given now [m]."""
         assert self.last is not None
-        given = TickInput(time=self.time, q=self.q, goal=self.setup.goal, known=True)
-        return Tick(given, self.last, TickTruth()), np.array(self._cloud(self.time))
+        inputs = TickInput(time=self.time, q=self.q, goal=self.setup.goal, known=True)
+        return Tick(inputs, self.last, TickTruth()), np.array(self._cloud(self.time))
 
     def _made(self) -> _core.Controller:
         self._ticks, self.last = 0, None

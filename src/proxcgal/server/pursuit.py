@@ -91,13 +91,15 @@ class JointPursuit:
         setup = arm.setup
         last, points_W = arm.asked()
         if active.T_WT is not None:  # of the tick that the reason is about
-            tool = np.asarray(setup.robot.tool_pose(last.given.q))
+            tool = np.asarray(setup.robot.tool_pose(last.inputs.q))
             active.remain = pose_errors(tool, active.T_WT)
 
         def judge() -> None:
             try:
-                given = last.given
-                active.ending = concluded(setup, ending, last.result, given.q, points_W, given.time)
+                inputs = last.inputs
+                active.ending = concluded(
+                    setup, ending, last.result, inputs.q, points_W, inputs.time
+                )
             except ProxError:  # then without what held it
                 active.ending = ending
 

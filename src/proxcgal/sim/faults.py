@@ -50,34 +50,34 @@ class FaultInjector:
         if problems:
             raise ConfigError("\n".join(problems))
 
-    def __call__(self, given: TickInput) -> TickInput:
+    def __call__(self, inputs: TickInput) -> TickInput:
         """What the controller gets instead of a tick's inputs."""
-        scans: Sequence[_core.Scan] = given.scans
+        scans: Sequence[_core.Scan] = inputs.scans
         for fault in self._faults:
-            scans = fault.apply(given.time, scans)
-        given = replace(given, scans=tuple(scans))
+            scans = fault.apply(inputs.time, scans)
+        inputs = replace(inputs, scans=tuple(scans))
         for of_input in self._inputs:
-            given = _spoiled_input(of_input, given)
-        return given
+            inputs = _spoiled_input(of_input, inputs)
+        return inputs
 
 
-def _spoiled_input(fault: Fault, given: TickInput) -> TickInput:
+def _spoiled_input(fault: Fault, inputs: TickInput) -> TickInput:
     end = np.inf if fault.end is None else fault.end
     value = value_of(fault)
     if fault.kind == "clock_jump":  # a clock that jumped stays so: `to` jumps back
-        shift = value if fault.start <= given.time < end else 0.0
+        shift = value if fault.start <= inputs.time < end else 0.0
         scans = tuple(
             _core.Scan(scan.sensor, scan.counter, scan.stamp + shift, scan.ranges, scan.status)
-            for scan in given.scans
+            for scan in inputs.scans
         )
-        return replace(given, time=given.time + shift, scans=scans if shift else given.scans)
-    if not fault.start <= given.time < end:
-        return given
+        return replace(inputs, time=inputs.time + shift, scans=scans if shift else inputs.scans)
+    if not fault.start <= inputs.time < end:
+        return inputs
     if fault.kind == "joints_old":
-        return replace(given, q_stamp=given.time - value)
+        return replace(inputs, q_stamp=inputs.time - value)
     if fault.kind == "joints_nan":
-        return replace(given, q=np.full_like(given.q, np.nan))
-    return replace(given, late=True)
+        return replace(inputs, q=np.full_like(inputs.q, np.nan))
+    return replace(inputs, late=True)
 
 
 class _Injected:

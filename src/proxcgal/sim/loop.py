@@ -16,7 +16,7 @@ from proxcgal.sim.tick import TickInput, TickResult
 
 def run_ticks(
     source: Source,
-    law: _core.Controller,
+    ctrl: _core.Controller,
     faults: Callable[[TickInput], TickInput] | None = None,
     known: Cloud | None = None,
 ) -> Iterator[tuple[TickInput, TickResult]]:
@@ -24,28 +24,28 @@ def run_ticks(
 
     Args:
         source: of inputs; it is told each command.
-        law: the controller.
+        ctrl: the controller.
         faults: between source and tick, such as a `FaultInjector`.
         known: for ticks that are given the scene itself, where that is at the tick's place in the
             run: the caller's clock may be what is faulty.
     """
     cloud = FixedCloud(np.empty((0, 3))) if known is None else known
     for tick in count():
-        if (given := source.read()) is None:
+        if (inputs := source.read()) is None:
             return
         if faults is not None:
-            given = faults(given)
-        scans = list(given.scans)
-        elapsed = tick * law.config.period
-        points_W = cloud(elapsed if given.known else 0.0)
+            inputs = faults(inputs)
+        scans = list(inputs.scans)
+        elapsed = tick * ctrl.config.period
+        points_W = cloud(elapsed if inputs.known else 0.0)
         velocity_W = None if cloud.still else cloud.velocities(elapsed)
         start, cpu = clock.perf_counter_ns(), clock.thread_time_ns()
-        if given.known:
-            out = law.tick_known(given.time, given.q, points_W, given.goal, velocity_W)
+        if inputs.known:
+            out = ctrl.tick_known(inputs.time, inputs.q, points_W, inputs.goal, velocity_W)
         else:
-            out = law.tick(given.time, given.q, scans, given.goal, given.late, given.q_stamp)
+            out = ctrl.tick(inputs.time, inputs.q, scans, inputs.goal, inputs.late, inputs.q_stamp)
         cpu_us = (clock.thread_time_ns() - cpu) / 1000.0
         tick_us = (clock.perf_counter_ns() - start) / 1000.0
-        result = TickResult.of(out, len(law.cloud_origins()), tick_us, cpu_us)
+        result = TickResult.of(out, len(ctrl.cloud_origins()), tick_us, cpu_us)
         source.command(result.qd)
-        yield given, result
+        yield inputs, result

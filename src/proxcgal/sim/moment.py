@@ -64,9 +64,9 @@ class Moment(Posed):
     def of(
         cls,
         setup: Setup,
-        given: TickInput,
+        inputs: TickInput,
         result: TickResult,
-        law: _core.Controller | None,
+        ctrl: _core.Controller | None,
         time: float,
         *,
         q: Array,
@@ -80,9 +80,9 @@ class Moment(Posed):
 
         Args:
             setup: of the run.
-            given: the tick's inputs.
+            inputs: the tick's inputs.
             result: its answer.
-            law: the controller, whose clouds are copied; None: clouds are not known.
+            ctrl: the controller, whose clouds are copied; None: clouds are not known.
             time: the scene's, for its poses [s].
             q: (n_q,) where the arm is, whatever the controller was told.
             true: distance from scene to robot [m].
@@ -92,15 +92,15 @@ class Moment(Posed):
             gripped: somebody who looks on holds it.
         """
         kept, raw, held = np.empty((0, 3)), np.empty((0, 3)), np.empty(0, bool)
-        if law is not None:
-            kept, raw = law.cloud_W(), law.raw_cloud_W()
-            held = np.isin(law.cloud_origins()[:, 0], list(off))
+        if ctrl is not None:
+            kept, raw = ctrl.cloud_W(), ctrl.raw_cloud_W()
+            held = np.isin(ctrl.cloud_origins()[:, 0], list(off))
         return cls(
             elapsed=since + time,
             q=q,
             links_W=np.asarray(setup.robot.link_poses(q)),
             solids_W=np.asarray(setup.drawn.poses(time)),
-            goal_W=given.goal,
+            goal_W=inputs.goal,
             hand_W=hand_W,
             gripped=gripped,
             kept_W=kept[~held].astype(np.float32),

@@ -45,7 +45,7 @@ class OperatorShape:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Truth:
+class GroundTruth:
     """What holds at one moment."""
 
     tcp_speed: float  #: [m/s]
@@ -147,7 +147,7 @@ class Physics:
         twist = self.tool_twist()
         return twist[:3] + np.cross(twist[3:], self.tool_R @ self._human_offset)
 
-    def truth(self, pairs: tuple[str, ...], ends: Sequence[tuple[str, Array]]) -> Truth:
+    def truth(self, pairs: tuple[str, ...], ends: Sequence[tuple[str, Array]]) -> GroundTruth:
         """What the guard should find, by MuJoCo's own kinematics and distances: an oracle.
 
         Args:
@@ -178,7 +178,7 @@ class Physics:
             way[2] += min(max(point[2] - human_W[2], -half), half)
             fastest = max(fastest, float(way @ (jacobian @ data.qvel)) / math.sqrt(way @ way))
         mujoco.mj_jacSite(model, data, jacobian, None, self._tool)
-        return Truth(
+        return GroundTruth(
             tcp_speed=float(np.linalg.norm(jacobian @ data.qvel)), distance=float(distance),
             velocity=fastest,
         )  # fmt: skip

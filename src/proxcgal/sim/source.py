@@ -13,7 +13,7 @@ from proxcgal.scenario.setup import Setup
 from proxcgal.sim.mount_faults import RealMounts
 from proxcgal.sim.range_sensor import ZONES, RangeModel
 from proxcgal.sim.tick import TickInput
-from proxcgal.sim.waypoints import Errand
+from proxcgal.sim.waypoints import Waypoints
 from proxcgal.sim.world import Hits, World
 
 _BEFORE = 1 << 20  # index of the scans before the run: their noise is none of the run's
@@ -56,7 +56,7 @@ class SimulatedSource:
         settings = setup.scenario.simulation
         goal = setup.scenario.goal
         self._setup = setup
-        self._errand = Errand(setup.goals, goal.arrival, goal.patience)
+        self._waypoints = Waypoints(setup.goals, goal.arrival, goal.patience)
         self._world = world
         self._period = 1.0 / settings.control_hz
         self._ticks = max(round(setup.scenario.duration * settings.control_hz), 1)
@@ -111,7 +111,7 @@ class SimulatedSource:
             scans += self._measure(rows, stamp, before + self._qd * (stamp - start))
         self._tick += 1
         tool_W = np.asarray(self._setup.robot.tool_pose(self._q))[:3, 3]
-        goal = self._errand.at(time, tool_W)
+        goal = self._waypoints.at(time, tool_W)
         return TickInput(time, self._q, goal, tuple(scans), self._world is None)
 
     def command(self, qd: Array) -> None:

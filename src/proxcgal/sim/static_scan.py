@@ -18,7 +18,7 @@ from proxcgal.sim.world import World
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Snapshot:
+class StaticScan:
     """Scans of every sensor, and their points: scan by scan, sensor by sensor, zone by zone."""
 
     setup: Setup  #: robot with the meshes that the filter used, skin, posture `q0`, goal
@@ -37,7 +37,7 @@ class Snapshot:
         )  # fmt: skip
 
 
-def take_snapshot(scenario: Scenario, scans: int = 1) -> Snapshot:
+def scan_static(scenario: Scenario, scans: int = 1) -> StaticScan:
     """Simulates the first scans of a scenario, and filters them as its controller does.
 
     Noise, dropout and self-hits are those of a run with the scenario's seed; the arm is not moved,
@@ -58,15 +58,15 @@ def take_snapshot(scenario: Scenario, scans: int = 1) -> Snapshot:
     }  # fmt: skip
     setup = Setup.of(scenario.model_copy(update=changed))
     source = SimulatedSource(setup, World(setup.robot, setup.scene), scenario.seed)
-    law = setup.make_controller("wb")
-    taken: list[Snapshot] = []
-    while len(taken) < scans and (given := source.read()) is not None:
-        law.tick(given.time, given.q, list(given.scans), given.goal)
-        if given.scans:
+    ctrl = setup.make_controller("wb")
+    taken: list[StaticScan] = []
+    while len(taken) < scans and (inputs := source.read()) is not None:
+        ctrl.tick(inputs.time, inputs.q, list(inputs.scans), inputs.goal)
+        if inputs.scans:
             kept = np.zeros((len(setup.skin), ZONES), bool)
-            kept[tuple(np.asarray(law.cloud_origins()).T)] = True
-            taken.append(_placed(setup, given, kept))
-    return Snapshot(
+            kept[tuple(np.asarray(ctrl.cloud_origins()).T)] = True
+            taken.append(_placed(setup, inputs, kept))
+    return StaticScan(
         setup=setup,
         scans=tuple(scan for part in taken for scan in part.scans),
         origins_W=np.concatenate([part.origins_W for part in taken]),
@@ -76,13 +76,13 @@ def take_snapshot(scenario: Scenario, scans: int = 1) -> Snapshot:
     )
 
 
-def _placed(setup: Setup, given: TickInput, kept: Bools) -> Snapshot:
+def _placed(setup: Setup, inputs: TickInput, kept: Bools) -> StaticScan:
     """One scan of every sensor: what the core's sense stage makes of it, emitters beside."""
     settings, model = setup.scenario.controller.filter, setup.skin.model
-    poses_W = np.asarray(setup.robot.link_poses(given.q))
+    poses_W = np.asarray(setup.robot.link_poses(inputs.q))
     links = setup.robot.link_names
     origins, points, tolerances, environment = [], [], [], []
-    for scan in given.scans:
+    for scan in inputs.scans:
         mount = setup.skin.mounts[scan.sensor]
         T_WS = poses_W[links.index(mount.link)] @ np.asarray(mount.T_LS)
         zones, points_S, _, sigma = (np.asarray(part) for part in _core.sense(model, scan))
@@ -92,8 +92,8 @@ def _placed(setup: Setup, given: TickInput, kept: Bools) -> Snapshot:
         origins.append(np.tile(T_WS[:3, 3], (len(points[-1]), 1)))
         tolerances.append(np.maximum(settings.tolerance, settings.sigmas * sigma[above]))
         environment.append(kept[scan.sensor, zones[above]])
-    return Snapshot(
-        setup=setup, scans=given.scans, origins_W=np.concatenate(origins),
+    return StaticScan(
+        setup=setup, scans=inputs.scans, origins_W=np.concatenate(origins),
         points_W=np.concatenate(points), tolerance=np.concatenate(tolerances),
         environment=np.concatenate(environment),
     )  # fmt: skip

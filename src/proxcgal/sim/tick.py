@@ -138,7 +138,7 @@ UNKNOWN = TickTruth(distance=np.nan, own=np.nan)
 class Tick:
     """One tick, whole."""
 
-    given: TickInput
+    inputs: TickInput
     result: TickResult
     truth: TickTruth
 

@@ -9,7 +9,7 @@ import numpy as np
 from proxcgal.core.typing import Array
 
 
-class Errand:
+class Waypoints:
     """The goal that is due; the next one on arrival, or when patience has run out."""
 
     def __init__(self, goals: Sequence[Array], arrival: float, patience: float) -> None:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Wishes:
+class CampaignRequest:
     """What a user asks a campaign for."""
 
     runs: int  # draws of each scene, or subjects
@@ -50,7 +50,7 @@ class Kind:
 
     title: str  # of its page
     introduction: str | Callable[[Summary], str]  # below the title
-    plan: Callable[[Wishes], Campaign]
+    plan: Callable[[CampaignRequest], Campaign]
     analyse: Callable[[pl.DataFrame, Campaign], Summary]
     listings: Callable[[Summary], list[Listing]]
     verdicts: Callable[[Summary], list[str]]  # a sentence each, from the numbers

@@ -12,7 +12,7 @@ from matplotlib import get_data_path
 from PIL import Image, ImageDraw, ImageFont
 
 from proxcgal.recording.reader import Recording
-from proxcgal.recording.render import Snapshot, draw, snapshots, write_gif
+from proxcgal.recording.render import RecordedMoment, draw, recorded_moments, write_gif
 from proxcgal.scenario.loading import HriScenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.scene.solids import Box
@@ -45,11 +45,11 @@ def motion_picture(
         SimulationError: there is no way to draw off screen.
     """
     setup = Setup.of(recordings[0].settings.scenario)
-    times = np.linspace(0.0, max(r.ticks[-1].given.time for r in recordings), FRAMES).tolist()
+    times = np.linspace(0.0, max(r.ticks[-1].inputs.time for r in recordings), FRAMES).tolist()
     telling, nearest = _telling(setup, recordings)
     stills = bisect.bisect_left(times, telling)  # where the still's moment stands among them
     times.insert(stills, telling)
-    seen = [snapshots(recording, times) for recording in recordings]
+    seen = [recorded_moments(recording, times) for recording in recordings]
     camera = camera_for(setup)
     world = World(setup.robot, setup.scenario.drawn(), setup.scenario.floor, setup.scene.names)
     frames = []
@@ -76,7 +76,7 @@ def _telling(setup: Setup, recordings: Sequence[Recording]) -> tuple[float, int]
     """
     if isinstance(setup.scenario, HriScenario):
         least = [
-            (tick.truth.distance, run, tick.given.time)
+            (tick.truth.distance, run, tick.inputs.time)
             for run, recording in enumerate(recordings)
             for tick in recording.ticks
             if np.isfinite(tick.truth.distance)
@@ -84,7 +84,7 @@ def _telling(setup: Setup, recordings: Sequence[Recording]) -> tuple[float, int]
         if least:
             _, run, time = min(least)
             return time, run
-    return max(recording.ticks[-1].given.time for recording in recordings), -1
+    return max(recording.ticks[-1].inputs.time for recording in recordings), -1
 
 
 def camera_for(setup: Setup) -> Camera:
@@ -123,7 +123,7 @@ def bearing_for(setup: Setup) -> float:
 
 
 def _pane(
-    world: World, camera: Camera, snapshot: Snapshot, recording: Recording, note: str
+    world: World, camera: Camera, snapshot: RecordedMoment, recording: Recording, note: str
 ) -> Image.Image:
     controller, scenario = recording.settings.controller, recording.settings.scenario
     picture = Image.new("RGB", (PANE[0], PANE[1] + STRIP), "white")
@@ -137,7 +137,7 @@ def _pane(
     if isinstance(scenario, HriScenario):
         whose = f"{scenario.name}, {scenario.operator.who}"
         pen.text((PANE[0] - 10, top), whose, font=_font(), fill=GREY, anchor="ra")
-    text = f"t = {snapshot.tick.given.time:.1f} s    true distance {true:.0f} mm{note}"
+    text = f"t = {snapshot.tick.inputs.time:.1f} s    true distance {true:.0f} mm{note}"
     pen.text((10, top + 18), text, font=_font(), fill="black")
     return picture
 

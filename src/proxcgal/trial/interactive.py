@@ -13,11 +13,11 @@ import numpy as np
 
 from proxcgal.core.modes import STOP
 from proxcgal.core.typing import Array
-from proxcgal.evaluation.ground_truth import Truth
+from proxcgal.evaluation.ground_truth import GroundTruth
 from proxcgal.models import Robot
 from proxcgal.scenario.loading import Scenario
 from proxcgal.scenario.setup import Setup
-from proxcgal.scene.dragging import Hands, LiveScene
+from proxcgal.scene.dragging import DraggedSolids, LiveScene
 from proxcgal.sim.faults import FaultInjector
 from proxcgal.sim.loop import run_ticks
 from proxcgal.sim.moment import Moment
@@ -41,7 +41,7 @@ class LiveTrial:
         *,
         robot: Robot | None = None,
         q: Array | None = None,
-        hands: Hands | None = None,
+        hands: DraggedSolids | None = None,
         since: float = 0.0,
     ) -> None:
         """Sets everything up.
@@ -58,7 +58,7 @@ class LiveTrial:
             ConfigError: what of the scenario does not fit; sensors that do not sit where it says.
         """
         setup = Setup.of(scenario, robot)
-        self.hands = hands or Hands()
+        self.hands = hands or DraggedSolids()
         self.off: frozenset[int] = frozenset()  #: rows of the sensors that are silent
         self.since = since
         self.controller = controller
@@ -75,7 +75,7 @@ class LiveTrial:
             q0=setup.q0 if q is None else np.array(q),
         )
         known = setup.known_cloud() if setup.uses_known_points(controller) else None
-        self.law = setup.make_controller(controller, 0 if known is None else len(known))
+        self.ctrl = setup.make_controller(controller, 0 if known is None else len(known))
         names = [mount.name for mount in setup.skin.mounts]
         self._faults = FaultInjector(scenario.faults, names, scenario.seed)
         world = World(setup.robot, scene) if known is None else None
@@ -85,15 +85,15 @@ class LiveTrial:
             require_mounts(setup, source)
         if isinstance(source, GuidedSource) and q is not None:
             source.take_over()  # its path began elsewhere
-        self._truth = Truth(setup.robot, measured)
+        self._truth = GroundTruth(setup.robot, measured)
         self._count = 0
-        self._ticks = run_ticks(source, self.law, self._spoiled, known)
+        self._ticks = run_ticks(source, self.ctrl, self._spoiled, known)
         self._last: tuple[TickInput, TickResult] | None = None
 
     @property
     def period(self) -> float:
         """[s] from tick to tick."""
-        return float(self.law.config.period)
+        return float(self.ctrl.config.period)
 
     @property
     def elapsed(self) -> float:
@@ -148,12 +148,12 @@ class LiveTrial:
     def moment(self) -> Moment:
         """What there is to see now, the true distance with it."""
         assert self._last is not None, "step() comes first"
-        given, result = self._last
+        inputs, result = self._last
         now = (self._count - 1) * self.period
         true = self._truth.nearest(self._source.q, now).distance
-        q = given.q if np.isfinite(given.q).all() else self._source.q
+        q = inputs.q if np.isfinite(inputs.q).all() else self._source.q
         return Moment.of(
-            self.setup, given, result, self.law, now, q=q, true=true,
+            self.setup, inputs, result, self.ctrl, now, q=q, true=true,
             since=self.since, off=self.off, **self._hand(),
         )  # fmt: skip
 
@@ -168,9 +168,9 @@ class LiveTrial:
     def _tool(self) -> Array:
         return np.array(self.setup.robot.tool_pose(self._source.q))
 
-    def _spoiled(self, given: TickInput) -> TickInput:
+    def _spoiled(self, inputs: TickInput) -> TickInput:
         """What the controller gets: the scenario's faults, and nothing of silent sensors."""
-        given = self._faults(given)
+        inputs = self._faults(inputs)
         if not self.off:
-            return given
-        return replace(given, scans=tuple(s for s in given.scans if s.sensor not in self.off))
+            return inputs
+        return replace(inputs, scans=tuple(s for s in inputs.scans if s.sensor not in self.off))

@@ -11,8 +11,8 @@ import numpy as np
 from proxcgal import _core
 from proxcgal.core.typing import Array, Bools
 from proxcgal.evaluation.coverage import coverage_of, sightings
-from proxcgal.evaluation.ground_truth import NOT_ASKED, Truth
-from proxcgal.evaluation.sparse_ground_truth import decisive_truth
+from proxcgal.evaluation.ground_truth import NOT_ASKED, GroundTruth
+from proxcgal.evaluation.sparse_ground_truth import sparse_ground_truth
 from proxcgal.evaluation.stall_diagnosis import concluded
 from proxcgal.evaluation.termination import Ending, GoalWatch
 from proxcgal.evaluation.trial_log import TOO_CLOSE, TrialLog, final_ticks, sampled_ticks
@@ -70,7 +70,7 @@ def run_trial(
     seed = scenario.seed if seed is None else seed
     setup = Setup.of(scenario, robot)
     known = setup.known_cloud() if setup.uses_known_points(controller) else None
-    law = setup.make_controller(controller, 0 if known is None else len(known))
+    ctrl = setup.make_controller(controller, 0 if known is None else len(known))
     faults = FaultInjector(scenario.faults, [mount.name for mount in setup.skin.mounts], seed)
     world = World(setup.robot, setup.scene) if known is None else None
     make = GuidedSource if isinstance(scenario, GuidedScenario) else SimulatedSource
@@ -78,7 +78,7 @@ def run_trial(
     if world is not None and scenario.skin.check_mounts:
         require_mounts(setup, source)
     sparse = (sparse_truth or without_truth) and recorder is None
-    truth = None if sparse else Truth(setup.robot, setup.measured)
+    truth = None if sparse else GroundTruth(setup.robot, setup.measured)
     log = None
     if recorder is not None:
         recorder.start(
@@ -95,15 +95,15 @@ def run_trial(
     ending = None
     ticks: list[Tick] = []
     reached: list[Array] = []  # where the arm really was: a fault may tell the controller otherwise
-    period = law.config.period
+    period = ctrl.config.period
     beat = max(round(0.1 * scenario.simulation.control_hz), 1)
-    for given, result in run_ticks(source, law, faults, known):
+    for inputs, result in run_ticks(source, ctrl, faults, known):
         reached.append(source.q)
-        leaked = 0 if known is not None else _leaked(law, source)
+        leaked = 0 if known is not None else _leaked(ctrl, source)
         true = NOT_ASKED if truth is None else truth(source.q, len(ticks) * period)
-        ticks.append(Tick(given, result, TickTruth(true.distance, true.link, true.own, leaked)))
+        ticks.append(Tick(inputs, result, TickTruth(true.distance, true.link, true.own, leaked)))
         if log is not None:
-            log.write(ticks[-1], (len(ticks) - 1) * period, law, reached[-1])
+            log.write(ticks[-1], (len(ticks) - 1) * period, ctrl, reached[-1])
         if on_progress is not None and len(ticks) % beat == 0:
             on_progress(min(len(ticks) * period / scenario.duration, 1.0))
         if watch is not None:
@@ -114,7 +114,7 @@ def run_trial(
         on_progress(1.0)
     if watch is not None:
         last = (len(ticks) - 1) * period
-        cloud_W = np.asarray(law.cloud_W()) if known is None else known(last)
+        cloud_W = np.asarray(ctrl.cloud_W()) if known is None else known(last)
         ending = ending or Ending("aborted", "the time is up")
         ending = concluded(setup, ending, ticks[-1].result, reached[-1], cloud_W, last)
     # Not the ticks' own time, which a fault may make jump.
@@ -141,7 +141,7 @@ def _with_truth(
     ticks: Sequence[Tick], elapsed: Array, q: Array, setup: Setup, wanted: Bools
 ) -> list[Tick]:
     """The ticks with the true distances that are wanted or decide."""
-    asked = decisive_truth(setup.robot, setup.measured, elapsed, q, wanted, under=TOO_CLOSE)
+    asked = sparse_ground_truth(setup.robot, setup.measured, elapsed, q, wanted, under=TOO_CLOSE)
     return [
         replace(tick, truth=TickTruth(float(distance), link, float(own), tick.truth.leaked))
         for tick, distance, link, own in zip(
@@ -150,9 +150,9 @@ def _with_truth(
     ]
 
 
-def _leaked(law: _core.Controller, source: SimulatedSource) -> int:
+def _leaked(ctrl: _core.Controller, source: SimulatedSource) -> int:
     """How many points of the filtered cloud really are the robot itself."""
-    origins = np.asarray(law.cloud_origins())[: law.seen_points]
+    origins = np.asarray(ctrl.cloud_origins())[: ctrl.seen_points]
     return int(source.saw_robot[origins[:, 0], origins[:, 1]].sum())
 
 
@@ -165,7 +165,7 @@ class _Log:
         self._hz = hz
         self._beats = -1
 
-    def write(self, tick: Tick, elapsed: float, law: _core.Controller, q: Array) -> None:
+    def write(self, tick: Tick, elapsed: float, ctrl: _core.Controller, q: Array) -> None:
         """One tick; the arm is drawn at `q`, where it is, whatever the controller is told."""
         beats = int(np.floor(elapsed * self._hz + 1e-9))  # those of the scans
         beat = beats > self._beats
@@ -175,7 +175,7 @@ class _Log:
             poses = np.asarray(self._robot.link_poses(q))
             names = self._robot.link_names
             if beats == 0 or not self._scene.still:
-                self._recorder.show_scene(tick.given.time, self._scene, elapsed)
-            self._recorder.show(tick.given.time, law.cloud_W(), names, poses, arrow)
-        if beat or tick.given.scans or self._recorder.ticks == "all":
+                self._recorder.show_scene(tick.inputs.time, self._scene, elapsed)
+            self._recorder.show(tick.inputs.time, ctrl.cloud_W(), names, poses, arrow)
+        if beat or tick.inputs.scans or self._recorder.ticks == "all":
             self._recorder.write(tick)

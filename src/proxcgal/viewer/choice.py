@@ -36,10 +36,10 @@ class Choice:
     @classmethod
     def of(cls, scenario: Scenario, controller: str) -> Choice:
         """Those of a scenario as it is."""
-        law = scenario.controller
+        settings = scenario.controller
         return cls(
             controller=controller, robot=scenario.robot, vertices=scenario.vertices_per_link,
-            noise=True, d_min=law.d_min, buffer=law.buffer, gain=law.avoid_gain,
+            noise=True, d_min=settings.d_min, buffer=settings.buffer, gain=settings.avoid_gain,
         )  # fmt: skip
 
     def applied(self, scenario: Scenario) -> Scenario:
@@ -59,12 +59,12 @@ class Choice:
         if not self.noise:
             # Without noise a scene at rest repeats itself: that is no fault then.
             monitor = changed.controller.monitor.model_copy(update={"suspect_repeats": 0})
-            law = changed.controller.model_copy(update={"monitor": monitor})
+            settings = changed.controller.model_copy(update={"monitor": monitor})
             quiet = dict.fromkeys(
                 ("sigma_ratio", "sigma_floor", "bias", "dropout", "uncertain"), 0.0
             )
             simulation = changed.simulation.model_copy(update=quiet)
-            changed = changed.model_copy(update={"controller": law, "simulation": simulation})
+            changed = changed.model_copy(update={"controller": settings, "simulation": simulation})
         return change_scenario(
             changed, "page",
             [
@@ -74,7 +74,7 @@ class Choice:
         )  # fmt: skip
 
     def _check(self, scenario: Scenario) -> None:
-        law = scenario.controller
+        settings = scenario.controller
         problems = []
         for name, value, allowed in (
             ("controller", self.controller, CONTROLLERS),
@@ -84,9 +84,9 @@ class Choice:
             if value not in allowed:
                 problems.append(f"{name} = {value!r}: there are {', '.join(map(str, allowed))}")
         for name, number, (low, high, _), own in (
-            ("d_min", self.d_min, D_MIN, law.d_min),
-            ("buffer", self.buffer, BUFFER, law.buffer),
-            ("gain", self.gain, GAIN, law.avoid_gain),
+            ("d_min", self.d_min, D_MIN, settings.d_min),
+            ("buffer", self.buffer, BUFFER, settings.buffer),
+            ("gain", self.gain, GAIN, settings.avoid_gain),
         ):
             if not min(low, own) <= number <= max(high, own):
                 problems.append(f"{name} = {number:g}: from {low:g} to {high:g}")

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from proxcgal.core.typing import Array
-from proxcgal.viewer.messages import Wishes
+from proxcgal.viewer.messages import Request
 
 #: Where a solid may be put, least and most of x, y, z [m].
 ROOM = np.array([[-5.0, -5.0, -1.5], [5.0, 5.0, 4.0]])
 
 
-class Desk:
+class CommandQueue:
     """Any thread may put something on it."""
 
     def __init__(self) -> None:
@@ -38,11 +38,11 @@ class Desk:
         with self._lock:
             self._hands[name] = pose
 
-    def take(self) -> Wishes | None:
+    def take(self) -> Request | None:
         """All that lies here; None where nothing does."""
         with self._lock:
             if not self._wanted and not self._hands:
                 return None
-            wishes = Wishes(**self._wanted, hands=tuple(self._hands.items()))
+            request = Request(**self._wanted, hands=tuple(self._hands.items()))
             self._wanted, self._hands = {}, {}
-            return wishes
+            return request

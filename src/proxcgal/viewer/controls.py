@@ -20,11 +20,11 @@ from proxcgal.viewer.choice import (
     resolutions,
     robots,
 )
-from proxcgal.viewer.command_queue import Desk
-from proxcgal.viewer.messages import Told
+from proxcgal.viewer.command_queue import CommandQueue
+from proxcgal.viewer.messages import Update
 from proxcgal.viewer.panel import Panel, pace, timing
 from proxcgal.viewer.plots import Plots
-from proxcgal.viewer.scene_model import Stage
+from proxcgal.viewer.scene_model import SceneModel
 
 _AS_THEY_ARE = "as they are"
 
@@ -36,12 +36,12 @@ class Controls(Panel):
         self,
         server: viser.ViserServer,
         gate: Gate,
-        desk: Desk,
+        queue: CommandQueue,
         scenario: Scenario,
         controller: str,
     ) -> None:
         """Adds everything, as the scenario has it."""
-        super().__init__(server, gate, desk)
+        super().__init__(server, gate, queue)
         self._choice = Choice.of(scenario, controller)
         self._scenario = scenario
         self._sensors: list[Any] = []
@@ -73,7 +73,7 @@ class Controls(Panel):
         """Fields of view, filtered cloud, removed points: are they to be seen?"""
         return self._views.value, self._kept.value, self._removed.value
 
-    def stage(self, stage: Stage, back: Choice | None) -> None:
+    def model(self, model: SceneModel, back: Choice | None) -> None:
         """Another stage; `back` is shown where what was wanted could not be."""
         if back is not None:
             self._choice = back  # first: what the controls tell then is nothing new
@@ -83,32 +83,32 @@ class Controls(Panel):
             self._noise.value = back.noise
             for name, slider in self._sliders.items():
                 slider.value = getattr(back, name)
-        if self._stage is None or self._stage.key != stage.key:
-            self._renew(stage)
-        self._stage = stage
+        if self._model is None or self._model.key != model.key:
+            self._renew(model)
+        self._model = model
 
-    def status(self, told: Told, note: str) -> None:
+    def status(self, told: Update, note: str) -> None:
         """The lines above the buttons."""
         if isinstance(told.moment, Moment):
             self._status.content = _status(told, told.moment, note)
         elif note:
             self._status.content = note
 
-    def _renew(self, stage: Stage) -> None:
+    def _renew(self, model: SceneModel) -> None:
         """Controls of what is on the stage: the handle and the sensors."""
         for old in [*self._of_stage, *self._sensors]:
             old.remove()
         self._of_stage, self._sensors = [], []
         gui = self._server.gui
-        if stage.grips:
-            self._dragging(stage, "obstacle")
+        if model.grips:
+            self._dragging(model, "obstacle")
         folder = gui.add_folder("sensors", expand_by_default=False)
         with folder:
-            switches = [self._switch(name, True, None) for name in stage.sensors]
+            switches = [self._switch(name, True, None) for name in model.sensors]
 
         async def silenced(_: Any) -> None:
             off = frozenset(row for row, each in enumerate(switches) if not each.value)
-            self._desk.want(off=off)
+            self._queue.want(off=off)
             self.off = off
 
         for each in switches:
@@ -120,7 +120,7 @@ class Controls(Panel):
         changed = replace(self._choice, **changes)
         if changed != self._choice:
             self._choice = changed
-            self._desk.want(choice=changed)
+            self._queue.want(choice=changed)
 
     def _hook_choices(self) -> None:
         read: dict[str, Callable[[Any], Any]] = {
@@ -142,7 +142,7 @@ def _number_of(text: str) -> int:
     return 0 if text == _AS_THEY_ARE else int(text.split()[0])
 
 
-def _status(told: Told, moment: Moment, note: str) -> str:
+def _status(told: Update, moment: Moment, note: str) -> str:
     seen, true = map(metres, (moment.seen, moment.true))
     lines = [
         f"**{modes.NAMES[moment.mode]}** at {moment.elapsed:.1f} s" + pace(told),

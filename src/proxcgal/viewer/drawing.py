@@ -15,7 +15,7 @@ from proxcgal.core.transforms import placed
 from proxcgal.core.typing import Array
 from proxcgal.scene.solids import Box, Capsule, Cylinder, Solid, Sphere
 from proxcgal.sim.moment import Posed
-from proxcgal.viewer.scene_model import Stage
+from proxcgal.viewer.scene_model import SceneModel
 
 Color = tuple[int, int, int]
 
@@ -40,21 +40,21 @@ class Drawing:
     """The nodes of one arm in its scene."""
 
     def __init__(
-        self, scene: viser.SceneApi, stage: Stage, *, name: str = "", ghost: bool = False
+        self, scene: viser.SceneApi, model: SceneModel, *, name: str = "", ghost: bool = False
     ) -> None:
         """Adds them, at the stage's start.
 
         Args:
             scene: of the server.
-            stage: what to draw.
+            model: what to draw.
             name: before every node's, for a second arm.
             ghost: another arm in the same scene: see-through, without sensors, clouds and solids.
         """
         self._scene = scene
-        self.stage = stage
+        self.model = model
         self._ghost = ghost
         self._name = name
-        self._links = [self._link(row, link) for row, link in enumerate(stage.links)]
+        self._links = [self._link(row, link) for row, link in enumerate(model.links)]
         self._views: list[tuple[list[int], Any, Any]] = []
         self._solids: list[Any] = []
         if not ghost:
@@ -64,11 +64,11 @@ class Drawing:
                     scene,
                     f"{name}/scene/{row}_{label}",
                     solid,
-                    SOLID if label in stage.sensed else UNSENSED,
+                    SOLID if label in model.sensed else UNSENSED,
                 )
-                for row, (label, solid) in enumerate(zip(stage.names, stage.solids, strict=True))
+                for row, (label, solid) in enumerate(zip(model.names, model.solids, strict=True))
             ]
-            self._place(self._solids, stage.solids_W)
+            self._place(self._solids, model.solids_W)
             self._kept = self._cloud("kept", KEPT, 0.009)
             self._held = self._cloud("held", SILENT, 0.009)
             self._removed = self._cloud("removed", REMOVED, 0.006)
@@ -121,7 +121,7 @@ class Drawing:
                 handle.remove()
 
     def _link(self, row: int, link: str) -> Any:
-        vertices_L, triangles = self.stage.meshes[row]
+        vertices_L, triangles = self.model.meshes[row]
         return self._scene.add_mesh_simple(
             f"{self._name}/arm/{row}_{link}", vertices_L, triangles,
             color=GHOST if self._ghost else LINKS[row % 2],
@@ -132,25 +132,25 @@ class Drawing:
     def _sensors(self) -> list[tuple[list[int], Any, Any]]:
         """Below each link that carries some: their places, and the edges of their views."""
         made = []
-        corners = _FRUSTUM * np.tan(0.5 * self.stage.field_of_view)
+        corners = _FRUSTUM * np.tan(0.5 * self.model.field_of_view)
         ends_S = np.array(
             [[x, y, _FRUSTUM] for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))], float
         )
         ends_S[:, :2] *= corners
-        for link in sorted(set(self.stage.sensor_links)):
-            rows = [row for row, on in enumerate(self.stage.sensor_links) if on == link]
+        for link in sorted(set(self.model.sensor_links)):
+            rows = [row for row, on in enumerate(self.model.sensor_links) if on == link]
             edges = []
             for row in rows:
-                T_LS = self.stage.sensors_L[row]
+                T_LS = self.model.sensors_L[row]
                 ends_L = placed(T_LS, ends_S)
                 edges += [[T_LS[:3, 3], end] for end in ends_L]
                 edges += [[ends_L[k], ends_L[(k + 1) % 4]] for k in range(4)]
-            place = f"{self._name}/arm/{link}_{self.stage.links[link]}"
+            place = f"{self._name}/arm/{link}_{self.model.links[link]}"
             frusta = self._scene.add_line_segments(
                 f"{place}/views", np.array(edges), _VIEW, thickness=1.0, thickness_units="screen"
             )
             dots = self._scene.add_point_cloud(
-                f"{place}/sensors", self.stage.sensors_L[rows, :3, 3],
+                f"{place}/sensors", self.model.sensors_L[rows, :3, 3],
                 np.array([SENSOR] * len(rows)),
                 point_size=0.014, point_shape="circle", point_shading="flat", precision="float32",
             )  # fmt: skip
@@ -197,7 +197,7 @@ def pose_parts(T_WO: Array) -> tuple[Array, Array]:
     return np.asarray(rotation.wxyz, np.float64), T_WO[:3, 3].copy()
 
 
-def furnish(server: viser.ViserServer, stage: Stage) -> None:
+def furnish(server: viser.ViserServer, model: SceneModel) -> None:
     """Light, floor and the first look: light enough for a renderer in software."""
     scene = server.scene
     scene.set_up_direction("+z")
@@ -213,35 +213,35 @@ def furnish(server: viser.ViserServer, stage: Stage) -> None:
     scene.add_grid(
         "/floor", width=4.0, height=4.0, plane="xy", cell_size=0.25, section_size=1.0,
         cell_color=(226, 229, 233), section_color=(190, 196, 204),
-        position=(0.0, 0.0, floor(stage)),
+        position=(0.0, 0.0, floor(model)),
     )  # fmt: skip
-    look(server, stage)
+    look(server, model)
 
 
-def floor(stage: Stage) -> float:
+def floor(model: SceneModel) -> float:
     """Where somebody stands, or what stands lower than the arm's base; else that base [m]."""
     lowest = (
         float(T_WO[2, 3] - np.abs(T_WO[2, :3]) @ solid.extent)
-        for T_WO, solid in zip(stage.solids_W, stage.solids, strict=True)
+        for T_WO, solid in zip(model.solids_W, model.solids, strict=True)
     )
     return min(0.0, *lowest, 0.0)
 
 
-def look(server: viser.ViserServer, stage: Stage) -> None:
+def look(server: viser.ViserServer, model: SceneModel) -> None:
     """Where a page begins to look from: beside the arm and its nearest solid."""
-    position, target = viewpoint(stage)
+    position, target = viewpoint(model)
     server.initial_camera.position = tuple(position)
     server.initial_camera.look_at = tuple(target)
     server.initial_camera.up = (0.0, 0.0, 1.0)
     server.initial_camera.fov = 0.75
 
 
-def viewpoint(stage: Stage) -> tuple[Array, Array]:
+def viewpoint(model: SceneModel) -> tuple[Array, Array]:
     """Camera position and what it looks at, (3,) each [m]."""
-    centers = [T_WO[:3, 3] for T_WO in stage.solids_W]
-    near = min(centers, key=lambda c: float(np.linalg.norm(c - stage.tool_W)), default=stage.tool_W)
-    target = 0.4 * stage.tool_W + 0.3 * near + np.array([0.0, 0.0, 0.1])
-    reach = float(np.linalg.norm(stage.tool_W)) + 0.5
+    centers = [T_WO[:3, 3] for T_WO in model.solids_W]
+    near = min(centers, key=lambda c: float(np.linalg.norm(c - model.tool_W)), default=model.tool_W)
+    target = 0.4 * model.tool_W + 0.3 * near + np.array([0.0, 0.0, 0.1])
+    reach = float(np.linalg.norm(model.tool_W)) + 0.5
     across = np.arctan2(near[1], near[0]) - 2.0  # a little from behind: solids hide nothing
     away = np.array([np.cos(across), np.sin(across), 0.5])
     return target + (0.9 + 1.2 * reach) * away / np.linalg.norm(away), target

@@ -13,14 +13,14 @@ from proxcgal.sim.moment import Moment
 from proxcgal.viewer.access import NOBODY, close, serve
 from proxcgal.viewer.client_messages import Bounds
 from proxcgal.viewer.drawing import Drawing, furnish
-from proxcgal.viewer.scene_model import Stage
+from proxcgal.viewer.scene_model import SceneModel
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Played:
     """One arm's moments, in the order of their time."""
 
-    stage: Stage
+    model: SceneModel
     moments: Sequence[Moment]
 
 
@@ -37,10 +37,10 @@ def exported(first: Played, ghosts: Sequence[Played] = ()) -> bytes:
     """
     server, _ = serve("127.0.0.1", 0, label="", bounds=Bounds(viewers=NOBODY))
     try:
-        furnish(server, first.stage)
-        drawings = [Drawing(server.scene, first.stage)]
+        furnish(server, first.model)
+        drawings = [Drawing(server.scene, first.model)]
         drawings += [
-            Drawing(server.scene, ghost.stage, name=f"/ghost{row}", ghost=True)
+            Drawing(server.scene, ghost.model, name=f"/ghost{row}", ghost=True)
             for row, ghost in enumerate(ghosts)
         ]
         played = list(zip(*(each.moments for each in (first, *ghosts)), strict=True))

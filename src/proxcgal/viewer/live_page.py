@@ -13,10 +13,10 @@ import viser
 from proxcgal.core.errors import SimulationError
 from proxcgal.scenario.loading import Scenario
 from proxcgal.viewer.access import Gate
-from proxcgal.viewer.command_queue import Desk
+from proxcgal.viewer.command_queue import CommandQueue
 from proxcgal.viewer.controls import Controls
 from proxcgal.viewer.drawing import Drawing, furnish
-from proxcgal.viewer.messages import Told
+from proxcgal.viewer.messages import Update
 from proxcgal.viewer.preparation import Preparation
 from proxcgal.viewer.simulation import FRAME_HZ, is_walk, simulate
 from proxcgal.viewer.walkthrough_panel import WalkPanel
@@ -46,15 +46,15 @@ class LivePage:
             controller: one of CONTROLLERS.
             hz: moments drawn a second.
         """
-        self.desk = Desk()
-        self.told = Told()  #: the last moment that was drawn
+        self.queue = CommandQueue()
+        self.told = Update()  #: the last moment that was drawn
         self.drawn = 0  #: moments so far
         self.bounds = (0.0, 0.0)  #: d_min and buffer of the law [m]
         self._server = server
         self._controls: Controls | WalkPanel = (
-            WalkPanel(server, gate, self.desk, scenario)
+            WalkPanel(server, gate, self.queue, scenario)
             if is_walk(scenario)
-            else Controls(server, gate, self.desk, scenario, controller)
+            else Controls(server, gate, self.queue, scenario, controller)
         )
         self._drawing: Drawing | None = None
         self._shown: tuple[object, ...] = ()
@@ -128,34 +128,34 @@ class LivePage:
             if not self._waiting and now >= spoken + 1.0 / WORD_HZ:
                 spoken = now
                 if (choice := self._preparation.done()) is not None:
-                    self.desk.want(choice=choice)
-                if (wishes := self.desk.take()) is not None:
-                    if wishes.choice is not None:
-                        wishes = replace(wishes, choice=self._preparation.asked(wishes.choice))
+                    self.queue.want(choice=choice)
+                if (request := self.queue.take()) is not None:
+                    if request.choice is not None:
+                        request = replace(request, choice=self._preparation.asked(request.choice))
                         if self._preparation.busy:
                             self._tell("preparing meshes ...")
-                    link.send(wishes)
-                    if wishes.reset or wishes.anew or wishes.release:
+                    link.send(request)
+                    if request.reset or request.anew or request.release:
                         self._controls.free()
 
-    def _take(self, told: Told) -> None:
+    def _take(self, told: Update) -> None:
         if told.failed:
             self.failure = told.failed
-            self._controls.status(Told(), f"the simulation has ended: {told.failed}")
+            self._controls.status(Update(), f"the simulation has ended: {told.failed}")
         if told.note:
             self._tell(told.note)
-        if told.stage is not None:
+        if told.model is not None:
             self._waiting = False
             self._note = ""
-            if self._drawing is None or self._drawing.stage.key != told.stage.key:
+            if self._drawing is None or self._drawing.model.key != told.model.key:
                 if self._drawing is None:
-                    furnish(self._server, told.stage)
+                    furnish(self._server, told.model)
                 else:
                     self._drawing.remove()
-                self._drawing = Drawing(self._server.scene, told.stage)
+                self._drawing = Drawing(self._server.scene, told.model)
                 self._shown = ()
-            self.bounds = told.stage.d_min, told.stage.buffer
-            self._controls.stage(told.stage, told.choice if told.refused else None)
+            self.bounds = told.model.d_min, told.model.buffer
+            self._controls.model(told.model, told.choice if told.refused else None)
             self._staged.set()
         if told.moment is not None and self._drawing is not None:
             self.told = told
@@ -165,7 +165,7 @@ class LivePage:
         self._note, self._noted = note, clock.monotonic()
         self._controls.status(self.told, note)
 
-    def _draw(self, told: Told, drawing: Drawing) -> None:
+    def _draw(self, told: Update, drawing: Drawing) -> None:
         assert told.moment is not None
         shown = (*self._controls.shown, self._controls.off)
         if shown != self._shown:

@@ -11,11 +11,11 @@ from multiprocessing.connection import Connection
 from proxcgal.core.typing import Array
 from proxcgal.sim.moment import Posed
 from proxcgal.viewer.choice import Choice
-from proxcgal.viewer.scene_model import Stage
+from proxcgal.viewer.scene_model import SceneModel
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Wishes:
+class Request:
     """What a page wants since it last spoke; what it does not want anew is None."""
 
     running: bool | None = None
@@ -30,11 +30,11 @@ class Wishes:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Told:
+class Update:
     """What the simulation tells a page."""
 
     moment: Posed | None = None
-    stage: Stage | None = None  #: where it is another one
+    model: SceneModel | None = None  #: where it is another one
     choice: Choice | None = None  #: with the stage: what it was made with
     refused: bool = False  #: with the choice: another one was wanted, and could not be
     note: str = ""  #: what could not be done, or is being done
@@ -53,22 +53,22 @@ class Outbox:
         """Args: `link` to the page."""
         self._link = link
         self._wake = threading.Condition()
-        self._sure: deque[Told] = deque()
-        self._newest: Told | None = None
+        self._sure: deque[Update] = deque()
+        self._newest: Update | None = None
         self._free = True  # the page has taken the last moment
         self._closed = False
         self.dropped = 0
         self._thread = threading.Thread(target=self._send, daemon=True)
         self._thread.start()
 
-    def offer(self, told: Told) -> None:
+    def offer(self, told: Update) -> None:
         """Takes the place of what was not sent yet."""
         with self._wake:
             self.dropped += self._newest is not None
             self._newest = told
             self._wake.notify()
 
-    def tell(self, told: Told) -> None:
+    def tell(self, told: Update) -> None:
         """Sent whatever happens."""
         with self._wake:
             self._sure.append(told)
@@ -96,7 +96,7 @@ class Outbox:
                         lambda: self._sure or self._closed or (self._free and self._newest)
                     )
                     if self._sure:
-                        told: Told | None = self._sure.popleft()
+                        told: Update | None = self._sure.popleft()
                     elif self._closed:
                         return
                     else:

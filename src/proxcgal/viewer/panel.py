@@ -13,10 +13,10 @@ from proxcgal.sim.moment import Posed
 from proxcgal.trial.walkthrough.grip import HAND
 from proxcgal.viewer.access import Gate
 from proxcgal.viewer.client_messages import between, one_of, switch
-from proxcgal.viewer.command_queue import ROOM, Desk
+from proxcgal.viewer.command_queue import ROOM, CommandQueue
 from proxcgal.viewer.drawing import pose_parts, viewpoint
-from proxcgal.viewer.messages import Told
-from proxcgal.viewer.scene_model import Stage
+from proxcgal.viewer.messages import Update
+from proxcgal.viewer.scene_model import SceneModel
 
 HANDLE = "/handle"
 _HANDLE_SHARE = 0.1  # of the distance that a page begins to look from: large enough to be caught
@@ -27,10 +27,10 @@ class Panel:
 
     off: frozenset[int] = frozenset()  #: rows of the sensors that are silent
 
-    def __init__(self, server: viser.ViserServer, gate: Gate, desk: Desk) -> None:
+    def __init__(self, server: viser.ViserServer, gate: Gate, queue: CommandQueue) -> None:
         """Adds the status line and the buttons of the simulation."""
-        self._server, self._gate, self._desk = server, gate, desk
-        self._stage: Stage | None = None
+        self._server, self._gate, self._queue = server, gate, queue
+        self._model: SceneModel | None = None
         self._of_stage: list[Any] = []
         self._held = False
         gui = server.gui
@@ -40,10 +40,10 @@ class Panel:
         self._buttons(
             "simulation",
             {
-                "run": lambda: desk.want(running=True),
-                "pause": lambda: desk.want(running=False),
-                "step": lambda: desk.want(running=False, steps=1),
-                "reset": lambda: desk.want(reset=True),
+                "run": lambda: queue.want(running=True),
+                "pause": lambda: queue.want(running=False),
+                "step": lambda: queue.want(running=False, steps=1),
+                "reset": lambda: queue.want(reset=True),
             },
         )
 
@@ -52,7 +52,7 @@ class Panel:
         """Fields of view, filtered cloud, removed points: are they to be seen?"""
         return True, True, True
 
-    def told(self, told: Told) -> None:
+    def told(self, told: Update) -> None:
         """Where the handle is while nobody holds it."""
         moment = told.moment
         assert moment is not None
@@ -68,26 +68,26 @@ class Panel:
         """Nobody holds anything any more."""
         self._held = False
 
-    def _dragging(self, stage: Stage, title: str) -> None:
+    def _dragging(self, model: SceneModel, title: str) -> None:
         """The handle, and the list of what it moves."""
-        self._of_stage.append(self._handle(stage))
+        self._of_stage.append(self._handle(model))
         folder = self._server.gui.add_folder(title)
         with folder:
-            names = list(dict.fromkeys(stage.grips))
-            self._which = self._list("drag", names, first_grip(stage))
+            names = list(dict.fromkeys(model.grips))
+            self._which = self._list("drag", names, first_grip(model))
             self._which.on_update(self._other)
             self._button("let go", self._let_go)
         self._of_stage.append(folder)
 
-    def _handle(self, stage: Stage) -> Any:
+    def _handle(self, model: SceneModel) -> Any:
         (x0, y0, z0), (x1, y1, z1) = ROOM.tolist()
-        name, T_W = first_grip(stage), np.eye(4)
-        T_W[:3, 3] = stage.tool_W
-        if name in stage.names:
-            T_W = stage.solids_W[stage.names.index(name)]
+        name, T_W = first_grip(model), np.eye(4)
+        T_W[:3, 3] = model.tool_W
+        if name in model.names:
+            T_W = model.solids_W[model.names.index(name)]
         wxyz, position = pose_parts(T_W)
         handle = self._server.scene.add_transform_controls(
-            HANDLE, scale=_HANDLE_SHARE * float(np.linalg.norm(np.subtract(*viewpoint(stage)))),
+            HANDLE, scale=_HANDLE_SHARE * float(np.linalg.norm(np.subtract(*viewpoint(model)))),
             depth_test=False, wxyz=wxyz, position=position,
             translation_limits=((x0, x1), (y0, y1), (z0, z1)),
         )  # fmt: skip
@@ -97,25 +97,25 @@ class Panel:
             T_WO = np.eye(4)
             T_WO[:3, :3] = viser.transforms.SO3(np.asarray(handle.wxyz)).as_matrix()
             T_WO[:3, 3] = handle.position
-            self._desk.move(self._which.value, T_WO)
+            self._queue.move(self._which.value, T_WO)
 
         handle.on_update(dragged)
         return handle
 
     def _place(self, moment: Posed) -> Any:
         """(4, 4) of what is chosen to be dragged."""
-        assert self._stage is not None
+        assert self._model is not None
         if self._which.value == HAND:
             assert moment.hand_W is not None
             return moment.hand_W
-        return moment.solids_W[self._stage.names.index(self._which.value)]
+        return moment.solids_W[self._model.names.index(self._which.value)]
 
     async def _other(self, _: Any) -> None:
         self._held = False  # the handle goes to what is chosen
 
     def _let_go(self) -> None:
         self._held = False
-        self._desk.want(release=True)
+        self._queue.want(release=True)
 
     def _button(self, label: str, work: Callable[[], None]) -> Any:
         button = self._server.gui.add_button(label)
@@ -159,22 +159,22 @@ class Panel:
         return control
 
 
-def first_grip(stage: Stage) -> str:
+def first_grip(model: SceneModel) -> str:
     """What the handle begins at: a hand where there is one, else what is nearest to the tool."""
-    if HAND in stage.grips:
+    if HAND in model.grips:
         return HAND
-    hands = [name for name in stage.grips if "hand" in name] or list(stage.grips)
-    far = np.linalg.norm(stage.solids_W[:, :3, 3] - stage.tool_W, axis=1)
-    return min(hands, key=lambda name: float(far[stage.names.index(name)]))
+    hands = [name for name in model.grips if "hand" in name] or list(model.grips)
+    far = np.linalg.norm(model.solids_W[:, :3, 3] - model.tool_W, axis=1)
+    return min(hands, key=lambda name: float(far[model.names.index(name)]))
 
 
-def pace(told: Told) -> str:
+def pace(told: Update) -> str:
     """Whether it runs, and how far behind real time, where it is."""
     behind = f", {100.0 * told.real_time:.0f} % of real time" if told.real_time < 0.97 else ""
     return ("" if told.running else ", paused") + behind
 
 
-def timing(told: Told, what: str) -> str:
+def timing(told: Update, what: str) -> str:
     """What one `what` took, and how late they were."""
     late, latest = (us / 1e3 for us in told.late_us)
     return f"{what} {told.cpu_us:.0f} us of CPU, late by {late:.1f} ms (p99 {latest:.0f})"

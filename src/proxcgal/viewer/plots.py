@@ -12,7 +12,7 @@ import viser.uplot
 
 from proxcgal.core.typing import Array
 from proxcgal.sim.moment import Moment, Posed
-from proxcgal.viewer.scene_model import Stage
+from proxcgal.viewer.scene_model import SceneModel
 
 Curve = tuple[str, str, tuple[int, ...]]  # label, colour, dashes [px]
 
@@ -53,7 +53,7 @@ class Plots:
 
 
 def whole_run(
-    gui: viser.GuiApi, moments: Sequence[Moment], again: Sequence[Moment] | None, stage: Stage
+    gui: viser.GuiApi, moments: Sequence[Moment], again: Sequence[Moment] | None, model: SceneModel
 ) -> None:
     """The same plots of a recorded run, and of the one that was computed again beside it."""
     curves: list[Curve] = [("seen", _SEEN, ()), ("true", _TRUE, (5, 4))]
@@ -63,7 +63,7 @@ def whole_run(
         curves.append(("seen, recomputed", _ORANGE, ()))
         distances.append([m.seen for m in again])
     chart = _distances(gui, *curves)
-    bounds = [np.full_like(time, stage.d_min), np.full_like(time, stage.d_min + stage.buffer)]
+    bounds = [np.full_like(time, model.d_min), np.full_like(time, model.d_min + model.buffer)]
     chart.data = (time, *(_drawn(np.array(each)) for each in distances), *bounds)
     curves = [("activation", _GREEN, ())]
     activations = [np.array([m.activation for m in moments])]

@@ -48,10 +48,10 @@ class ReplayPage:
         self._playing = False
         self._row = -1
         self._closing = threading.Event()
-        furnish(server, recorded.stage)
-        self._drawings = [Drawing(server.scene, recorded.stage)]
+        furnish(server, recorded.model)
+        self._drawings = [Drawing(server.scene, recorded.model)]
         if again is not None:
-            self._drawings.append(Drawing(server.scene, again.stage, name="/again", ghost=True))
+            self._drawings.append(Drawing(server.scene, again.model, name="/again", ghost=True))
         gui = server.gui
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
         gui.main_panel.dock_right()
@@ -66,7 +66,7 @@ class ReplayPage:
         self._views = gui.add_checkbox("fields of view", True)
         gate.offer(self._views, switch)
         self._status = gui.add_markdown("")
-        whole_run(gui, recorded.moments, again.moments if again else None, recorded.stage)
+        whole_run(gui, recorded.moments, again.moments if again else None, recorded.model)
 
         async def scrubbed(_: Any) -> None:
             # The nearest: the line counts in hundredths of a second, and moments may lie between.

@@ -13,7 +13,7 @@ from proxcgal.recording.replay import Replay
 from proxcgal.scenario.setup import Setup
 from proxcgal.sim.moment import Moment
 from proxcgal.sim.tick import Tick
-from proxcgal.viewer.scene_model import Stage
+from proxcgal.viewer.scene_model import SceneModel
 
 AHEAD = 0.5  #: [s] that a recomputed command is followed for, to be seen
 
@@ -22,7 +22,7 @@ AHEAD = 0.5  #: [s] that a recomputed command is followed for, to be seen
 class Replayed:
     """A run's moments, evenly in time."""
 
-    stage: Stage
+    model: SceneModel
     controller: str
     moments: tuple[Moment, ...]
     same: int | None  #: ticks whose answers are the recorded ones bit for bit; None: not asked
@@ -57,9 +57,9 @@ def replayed(
             _moment(setup, None, tick, q, float(time))
             for tick, q, time in zip(recording.ticks, recording.postures(), times, strict=True)
         ]
-        return Replayed(Stage.of(setup), settings.controller, tuple(moments), None, len(rows))
+        return Replayed(SceneModel.of(setup), settings.controller, tuple(moments), None, len(rows))
     again = Replay(recording, controller, overrides)
-    period = again.law.config.period
+    period = again.ctrl.config.period
     step = max(round(1.0 / (hz * period)), 1)
     last = len(recording.ticks) - 1
     moments, same = [], 0
@@ -71,13 +71,13 @@ def replayed(
     if ahead:
         moments = [_ahead(again.setup, moment) for moment in moments]
     return Replayed(
-        Stage.of(again.setup), again.controller, tuple(moments), same, len(recording.ticks)
+        SceneModel.of(again.setup), again.controller, tuple(moments), same, len(recording.ticks)
     )
 
 
 def _moment(setup: Setup, again: Replay | None, tick: Tick, q: Array, elapsed: float) -> Moment:
-    law = None if again is None else again.law
-    return Moment.of(setup, tick.given, tick.result, law, elapsed, q=q, true=tick.truth.distance)
+    ctrl = None if again is None else again.ctrl
+    return Moment.of(setup, tick.inputs, tick.result, ctrl, elapsed, q=q, true=tick.truth.distance)
 
 
 def _ahead(setup: Setup, moment: Moment) -> Moment:

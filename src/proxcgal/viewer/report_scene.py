@@ -14,7 +14,7 @@ from proxcgal.scenario.loading import load_scenario
 from proxcgal.trial.interactive import LiveTrial
 from proxcgal.viewer.export import Played, exported
 from proxcgal.viewer.replayed import Replayed, replayed
-from proxcgal.viewer.scene_model import Stage
+from proxcgal.viewer.scene_model import SceneModel
 
 _HZ = 10.0  # moments a second, where the run is short
 _MOMENTS = 150  # at most
@@ -52,7 +52,7 @@ def still_scene(name: str) -> bytes:
     trial = LiveTrial(load_scenario(name), "wb")
     for _ in range(round(_SEEN_AFTER / trial.period)):
         trial.step()
-    return exported(Played(Stage.of(trial.setup), [trial.moment()]))
+    return exported(Played(SceneModel.of(trial.setup), [trial.moment()]))
 
 
 def _together(runs: Sequence[Replayed]) -> list[Played]:
@@ -67,5 +67,5 @@ def _together(runs: Sequence[Replayed]) -> list[Played]:
             replace(run.moments[int(row)], elapsed=time)
             for row, time in zip(rows, times, strict=True)
         ]
-        out.append(Played(run.stage, moments))
+        out.append(Played(run.model, moments))
     return out

@@ -20,7 +20,7 @@ OPERATOR = "operator"  #: the capsule that rides on the tool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Stage:
+class SceneModel:
     """One robot with its sensors, and the scene's solids."""
 
     robot: str
@@ -46,7 +46,7 @@ class Stage:
         """Of what a trial is set up with; its solids where they are at the start."""
         links = list(setup.robot.link_names)
         mounts = setup.skin.mounts
-        law = setup.scenario.controller
+        settings = setup.scenario.controller
         return cls(
             robot=setup.robot.name,
             scenario=setup.scenario.name,
@@ -62,9 +62,9 @@ class Stage:
             solids=setup.drawn.solids,
             solids_W=np.asarray(setup.drawn.poses(0.0)),
             tool_W=np.asarray(setup.robot.tool_pose(setup.q0))[:3, 3],
-            d_min=law.d_min,
-            buffer=law.buffer,
-            gain=law.avoid_gain,
+            d_min=settings.d_min,
+            buffer=settings.buffer,
+            gain=settings.avoid_gain,
         )
 
     @classmethod

@@ -22,8 +22,8 @@ from proxcgal.scenario.walkthrough import WalkScenario
 from proxcgal.trial.interactive import LiveTrial
 from proxcgal.trial.walkthrough.interactive import WalkTrial
 from proxcgal.viewer.choice import Choice
-from proxcgal.viewer.messages import Outbox, Told, Wishes
-from proxcgal.viewer.scene_model import Stage
+from proxcgal.viewer.messages import Outbox, Request, Update
+from proxcgal.viewer.scene_model import SceneModel
 
 FRAME_HZ = 15.0  #: moments that are offered to the page
 LOST = 0.1  #: [s] behind real time from which what is lost stays lost
@@ -44,9 +44,9 @@ def simulate(link: Connection, scenario: Scenario, controller: str, hz: float = 
     except (EOFError, BrokenPipeError, ConnectionResetError, KeyboardInterrupt):
         pass
     except ProxError as error:
-        outbox.tell(Told(failed=str(error)))
+        outbox.tell(Update(failed=str(error)))
     except Exception as error:  # the page is to say so, not to stand still
-        outbox.tell(Told(failed=f"{type(error).__name__}: {error}"))
+        outbox.tell(Update(failed=f"{type(error).__name__}: {error}"))
         raise
     finally:
         outbox.close()
@@ -69,7 +69,7 @@ class _Simulation:
             WalkTrial(scenario) if is_walk(scenario) else LiveTrial(scenario, controller)
         )
         self._fresh()
-        self._stage()
+        self._model()
 
     def run(self) -> None:
         """Tick after tick, each when it is due."""
@@ -77,8 +77,8 @@ class _Simulation:
         frame_due, simulated, shown = begin, 0.0, -1.0
         while True:
             steps = 0
-            for wishes in self._received(wait=0.0 if self._running else 0.02):
-                steps += self._grant(wishes)
+            for request in self._received(wait=0.0 if self._running else 0.02):
+                steps += self._grant(request)
             now = clock.monotonic()
             if not self._running and steps == 0:
                 due = begin = now
@@ -100,7 +100,7 @@ class _Simulation:
             due = max(due + self._trial.period, clock.monotonic() - LOST)
             clock.sleep(max(due - clock.monotonic(), 0.0))
 
-    def _received(self, wait: float) -> Iterable[Wishes]:
+    def _received(self, wait: float) -> Iterable[Request]:
         while self._link.poll(wait):
             wait = 0.0
             message = self._link.recv()
@@ -109,28 +109,28 @@ class _Simulation:
             else:
                 yield message
 
-    def _grant(self, wishes: Wishes) -> int:
+    def _grant(self, request: Request) -> int:
         """Does what is wanted; how many single ticks are still to be made."""
         stopped = self._trial.stopped
-        if wishes.anew or (wishes.reset and not stopped):
+        if request.anew or (request.reset and not stopped):
             self._restart()
-        elif wishes.reset or (wishes.choice is not None and stopped):
+        elif request.reset or (request.choice is not None and stopped):
             self._note(f"{self._latched}: only Enter where `proxcgal view` runs leads out of it")
-        if wishes.choice is not None and not stopped and wishes.choice != self._choice:
-            self._choose(wishes.choice)
-        if wishes.running is not None:
-            self._running = wishes.running
-        if wishes.release:
+        if request.choice is not None and not stopped and request.choice != self._choice:
+            self._choose(request.choice)
+        if request.running is not None:
+            self._running = request.running
+        if request.release:
             self._trial.release()
-        for name, pose in wishes.hands:
+        for name, pose in request.hands:
             self._trial.move(name, pose)
-        if wishes.off is not None:
-            self._off = wishes.off
+        if request.off is not None:
+            self._off = request.off
             if isinstance(self._trial, LiveTrial):
-                self._trial.off = wishes.off
-        if wishes.enable and isinstance(self._trial, WalkTrial):
+                self._trial.off = request.off
+        if request.enable and isinstance(self._trial, WalkTrial):
             self._trial.enable()
-        return 0 if self._running else min(wishes.steps, 100)
+        return 0 if self._running else min(request.steps, 100)
 
     @property
     def _latched(self) -> str:
@@ -165,14 +165,14 @@ class _Simulation:
             )  # fmt: skip
         except ProxError as error:
             self._note(str(error))
-            self._stage(refused=True)
+            self._model(refused=True)
             return
         if not keep:
             self._off = frozenset()
         self._trial.off = self._off
         self._choice = choice
         self._fresh()
-        self._stage()
+        self._model()
 
     def _fresh(self) -> None:
         self._late: deque[float] = deque(maxlen=_LATENESS)
@@ -188,7 +188,7 @@ class _Simulation:
     def _show(self, real_time: float) -> None:
         late = np.array(self._late or [0.0])
         self._outbox.offer(
-            Told(
+            Update(
                 moment=self._trial.moment(),
                 late_us=(float(np.median(late)), float(np.percentile(late, 99))),
                 cpu_us=float(np.median(self._cpu or [0.0])),
@@ -196,12 +196,16 @@ class _Simulation:
             )
         )  # fmt: skip
 
-    def _stage(self, *, refused: bool = False) -> None:
+    def _model(self, *, refused: bool = False) -> None:
         trial = self._trial
-        stage = Stage.of_walk(trial) if isinstance(trial, WalkTrial) else Stage.of(trial.setup)
+        model = (
+            SceneModel.of_walk(trial)
+            if isinstance(trial, WalkTrial)
+            else SceneModel.of(trial.setup)
+        )
         self._outbox.tell(
-            Told(stage=stage, choice=self._choice, running=self._running, refused=refused)
+            Update(model=model, choice=self._choice, running=self._running, refused=refused)
         )
 
     def _note(self, text: str) -> None:
-        self._outbox.tell(Told(note=text, running=self._running))
+        self._outbox.tell(Update(note=text, running=self._running))

@@ -11,11 +11,11 @@ from proxcgal.scenario.walkthrough import Guard, WalkScenario
 from proxcgal.sim.moment import Posed
 from proxcgal.trial.walkthrough.interactive import WalkMoment
 from proxcgal.viewer.access import Gate
-from proxcgal.viewer.command_queue import Desk
-from proxcgal.viewer.messages import Told
+from proxcgal.viewer.command_queue import CommandQueue
+from proxcgal.viewer.messages import Update
 from proxcgal.viewer.panel import Panel, pace, timing
 from proxcgal.viewer.plots import SPAN, plot
-from proxcgal.viewer.scene_model import Stage
+from proxcgal.viewer.scene_model import SceneModel
 
 ENABLE = "enable torque"
 _BLUE, _RED, _GREEN, _ORANGE = "#2a5fb0", "#d61e28", "#10963c", "#dc7814"
@@ -28,26 +28,26 @@ class WalkPanel(Panel):
     """Drag the hand; look at what the guard watches; switch the torque on again."""
 
     def __init__(
-        self, server: viser.ViserServer, gate: Gate, desk: Desk, scenario: WalkScenario
+        self, server: viser.ViserServer, gate: Gate, queue: CommandQueue, scenario: WalkScenario
     ) -> None:
         """Adds everything."""
-        super().__init__(server, gate, desk)
-        self._button(ENABLE, lambda: desk.want(enable=True))
+        super().__init__(server, gate, queue)
+        self._button(ENABLE, lambda: queue.want(enable=True))
         self.plots = WalkPlots(server.gui, scenario.guard)
 
-    def stage(self, stage: Stage, back: object) -> None:
+    def model(self, model: SceneModel, back: object) -> None:
         """The stage, which stays the same."""
-        if self._stage is None:
-            self._stage = stage
-            self._dragging(stage, "hand")
+        if self._model is None:
+            self._model = model
+            self._dragging(model, "hand")
 
-    def told(self, told: Told) -> None:
+    def told(self, told: Update) -> None:
         """Where the handle is: at the tool, where no hand holds that."""
         if isinstance(told.moment, WalkMoment) and told.moment.state != "on":
             self._held = False  # a hand lets go of an arm that has stopped
         super().told(told)
 
-    def status(self, told: Told, note: str) -> None:
+    def status(self, told: Update, note: str) -> None:
         """The lines above the buttons."""
         if isinstance(told.moment, WalkMoment):
             self._status.content = status(told, told.moment, note)
@@ -114,7 +114,7 @@ class WalkPlots:
         )
 
 
-def status(told: Told, moment: WalkMoment, note: str) -> str:
+def status(told: Update, moment: WalkMoment, note: str) -> str:
     """The state of the guard first."""
     lines = [f"{_state(moment)} at {moment.elapsed:.1f} s{pace(told)}"]
     if moment.trip:

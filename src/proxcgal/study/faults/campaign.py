@@ -20,7 +20,7 @@ from proxcgal.study.campaign import Campaign, Trial, plain
 from proxcgal.study.faults.cases import ROW_OF, ROWS, TICK_MS, Fault, Row
 from proxcgal.study.faults.figures import figures
 from proxcgal.study.faults.texts import captions, listings, pages, verdicts
-from proxcgal.study.kind import Kind, Wishes
+from proxcgal.study.kind import CampaignRequest, Kind
 from proxcgal.study.trials import identity, robot_of, simulate
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ COLUMNS = (
 _SLACK = 1e-9  # [s] a tick at the bound is in time
 
 
-def plan(wishes: Wishes) -> Campaign:
+def plan(request: CampaignRequest) -> Campaign:
     """Every row on every robot, each run with its own onset, sensor and noise.
 
     Raises:
@@ -55,14 +55,14 @@ def plan(wishes: Wishes) -> Campaign:
     trials: list[Trial] = []
     scenes: dict[str, str] = {}
     robots: set[str] = set()
-    for source in wishes.scenarios or SCENES:
+    for source in request.scenarios or SCENES:
         kind = load_scenario(source).kind
         if kind != "static":
             raise ConfigError(
                 f'--scenario {source}: kind = "{kind}": campaign faults takes scenarios of '
                 'kind = "static"'
             )
-        base = load_scenario(source, (*SET, *wishes.overrides))
+        base = load_scenario(source, (*SET, *request.overrides))
         _refuse_short(base)
         robot = robot_of(base)
         setup = Setup.of(base, robot)
@@ -73,8 +73,8 @@ def plan(wishes: Wishes) -> Campaign:
         robots.add(plain(base.robot))
         scenes |= identity(base, robot)
         for place, row in enumerate(ROWS):
-            for number in range(wishes.runs):
-                draw = np.random.default_rng([wishes.seed, number, place])
+            for number in range(request.runs):
+                draw = np.random.default_rng([request.seed, number, place])
                 onset = round(float(draw.uniform(EARLIEST, LATEST)), 3)
                 if row.refused:
                     faults: Sequence[Fault] = _mount_faults(row, mounts, draw)
@@ -82,11 +82,11 @@ def plan(wishes: Wishes) -> Campaign:
                 else:
                     faults = row.faults(int(draw.integers(sensors)))
                     text = _assignment(faults, onset, onset + row.duration)
-                overrides = (*SET, *row.settings, *wishes.overrides, text)
+                overrides = (*SET, *row.settings, *request.overrides, text)
                 trials.append(
                     Trial(
                         scenario=load_scenario(source, overrides), source=source,
-                        overrides=overrides, controller="wb", seed=wishes.seed + number,
+                        overrides=overrides, controller="wb", seed=request.seed + number,
                         robot_digest=robot.digest,
                         tags={"robot": base.robot, "row": row.name, "run": number},
                     )
@@ -94,8 +94,8 @@ def plan(wishes: Wishes) -> Campaign:
     if not trials:
         raise ConfigError("--runs: no trial is left")
     description = {
-        "kind": "faults", "seed": wishes.seed, "scenarios": list(wishes.scenarios or SCENES),
-        "set": list(wishes.overrides), **scenes,
+        "kind": "faults", "seed": request.seed, "scenarios": list(request.scenarios or SCENES),
+        "set": list(request.overrides), **scenes,
     }  # fmt: skip
     return Campaign(description=description, trials=trials, perform=perform, columns=COLUMNS)
 

@@ -19,8 +19,12 @@ _COMMAND = "cpp/tests/test_admissible.cpp"
 _MESH = "cpp/tests/test_mesh_tree.cpp"
 _PIPELINE = "cpp/tests/test_pipeline.cpp"
 _FUZZ = "cpp/tests/test_fuzz.cpp"
-_SERVER = "tests/test_joint_server.py"
-_SERVE = "tests/test_serve.py"
+_SERVER = "tests/server/test_joint_server.py"
+_RECORDING = "tests/recording/test_recording.py"
+_PAGE = "tests/viewer/test_interactive.py"
+_GATE = "tests/viewer/test_access.py"
+_SOLVE_PY = "tests/pipeline/test_solve.py"
+_SERVE = "tests/server/test_serve.py"
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +51,7 @@ SHOWN: tuple[Shown, ...] = (
           ((_STALENESS, "MotionIntoWhatASilentSensorSawIsHeld"),)),
     Shown("every status code and range that is none", "invalid, counted; neither contact nor free",
           ((_PIPELINE, "OnlyTrustedZonesInRangeBecomePoints"),
-           ("tests/test_faults.py", "test_every_status_code_is_judged_as_the_table_has_it"),
+           ("tests/study/test_faults.py", "test_every_status_code_is_judged_as_the_table_has_it"),
            (_CONTROLLER, "WhatNoZoneTellsIsUnknownNotFree"))),
     Shown("duplicate, older, future and very old scans", "refused and told",
           ((_STALENESS, "ARepeatedOrOlderScanIsRefused"),
@@ -56,11 +60,11 @@ SHOWN: tuple[Shown, ...] = (
           ((_CLOCK, "AClockThatJumpsAnHourChangesNoCommand"),)),
     Shown("mount 5 mm or 2 degrees wrong", "found where enough of the body is in view, in those "
           "directions that show; the run is refused",
-          (("tests/test_mounts.py",
+          (("tests/models/test_mount_check.py",
             "test_5_mm_or_2_degrees_are_found_wherever_the_check_says_that_it_can"),
-           ("tests/test_mounts.py", "test_noise_alone_makes_no_mount_wrong"),
-           ("tests/test_mounts.py", "test_a_sensor_that_sees_no_body_is_not_judged"),
-           ("tests/test_mounts.py",
+           ("tests/models/test_mount_check.py", "test_noise_alone_makes_no_mount_wrong"),
+           ("tests/models/test_mount_check.py", "test_a_sensor_that_sees_no_body_is_not_judged"),
+           ("tests/models/test_mount_check.py",
             "test_the_command_refuses_with_exit_code_2_and_writes_nothing"),
            (_MISBEHAVIOUR, "WhereMountsAreAwaitedTheArmHoldsUntilTheyAreAccepted"))),
     Shown("cloud 100 times as large, or at a link's middle", "bounded steps; then a lower bound, "
@@ -71,12 +75,12 @@ SHOWN: tuple[Shown, ...] = (
           "face; faces without area left out and counted; the limit names itself",
           ((_MESH, "RefusesWhatNoIndexCanBeBuiltFrom"),
            (_MESH, "FacesWithoutAreaAreLeftOutAndCounted"),
-           ("tests/test_models_meshes.py", "huge.stl"))),
+           ("tests/models/test_mesh_files.py", "huge.stl"))),
     Shown("URDF with a cycle, two parents, orphans, no such mesh, paths outside, entities, "
           "depth 200 000", "refused with the names, under 1 s and 256 MB",
-          (("tests/test_models_urdf.py", "test_refused_with_the_file_and_the_names"),
-           ("tests/test_models_urdf.py", "test_mesh_paths_stay_within_their_folders"),
-           ("tests/test_models_urdf.py",
+          (("tests/models/test_urdf.py", "test_refused_with_the_file_and_the_names"),
+           ("tests/models/test_urdf.py", "test_mesh_paths_stay_within_their_folders"),
+           ("tests/models/test_urdf.py",
             "test_hostile_depth_and_size_are_refused_at_little_cost"))),
     Shown("joint state not a number", "STOP within the tick, latched",
           ((_STALENESS, "ANanJointStateStopsWithinOneCycleAndStaysStopped"),)),
@@ -109,31 +113,31 @@ SHOWN: tuple[Shown, ...] = (
           "10 mm or inside d_min, else one per 100 ms",
           ((_MISBEHAVIOUR, "CommandsStayContinuousWhereTheClosestPointJumps"),)),
     Shown("killed while recording", "every acknowledged record is read",
-          (("tests/test_recording.py", "test_20_killed_writers_lose_no_acknowledged_tick"),)),
+          ((_RECORDING, "test_20_killed_writers_lose_no_acknowledged_tick"),)),
     Shown("disk full", "control as it was; told at that tick",
-          (("tests/test_trial.py", "test_a_full_disk_changes_no_command_and_is_told"),
-           ("tests/test_recording.py",
+          (("tests/trial/test_trial.py", "test_a_full_disk_changes_no_command_and_is_told"),
+           (_RECORDING,
             "test_no_more_room_on_the_way_is_told_at_that_tick_and_what_was_written_is_read"))),
     Shown("file cut or flipped anywhere", "all up to the damage is read, and where it is told",
-          (("tests/test_recording.py", "test_a_file_cut_anywhere_gives_all_ticks_before_the_cut"),
-           ("tests/test_recording.py",
+          ((_RECORDING, "test_a_file_cut_anywhere_gives_all_ticks_before_the_cut"),
+           (_RECORDING,
             "test_a_flipped_byte_anywhere_is_told_and_costs_nothing_before_it"))),
     Shown("simulator warns or diverges", "the run fails",
-          (("tests/test_world.py", "test_a_warning_of_mujoco_fails_the_run"),
-           ("tests/test_world.py", "test_an_arm_without_finite_pose_is_an_error"))),
+          (("tests/sim/test_world.py", "test_a_warning_of_mujoco_fails_the_run"),
+           ("tests/sim/test_world.py", "test_an_arm_without_finite_pose_is_an_error"))),
     Shown("hostile bytes in any input", "errors with a name only; no command outside the limits",
           ((_FUZZ, "TwentyThousandRandomTicksKeepEveryPromise"),
            ("tests/test_fuzz.py", "test_broken_files_raise_errors_of_ours_only"))),
     Shown("hostile client of the live page", "loopback by default, a token beyond; sizes, counts, "
           "rates and values bounded; no message leads out of a STOP",
-          (("tests/test_gate.py",
+          ((_GATE,
             "test_without_the_token_neither_page_nor_connection_is_given"),
-           ("tests/test_gate.py", "test_pages_of_other_sites_are_refused"),
-           ("tests/test_gate.py", "test_a_message_that_no_page_needs_is_dropped"),
-           ("tests/test_gate.py", "test_a_value_outside_of_its_control_is_dropped"),
-           ("tests/test_gate.py", "test_a_flood_ends_its_connection_and_no_other"),
-           ("tests/test_gate.py", "test_a_viewer_that_vanishes_leaves_nothing_behind"),
-           ("tests/test_view.py", "test_nothing_that_a_page_says_leads_out_of_a_stop"))),
+           (_GATE, "test_pages_of_other_sites_are_refused"),
+           (_GATE, "test_a_message_that_no_page_needs_is_dropped"),
+           (_GATE, "test_a_value_outside_of_its_control_is_dropped"),
+           (_GATE, "test_a_flood_ends_its_connection_and_no_other"),
+           (_GATE, "test_a_viewer_that_vanishes_leaves_nothing_behind"),
+           (_PAGE, "test_nothing_that_a_page_says_leads_out_of_a_stop"))),
     Shown("goal of the 12-joint server preempted, cancelled, held off, or two at once",
           "exactly one end: succeeded, aborted or cancelled, with its reason",
           ((_SERVER, "test_a_goal_is_reached_and_its_feedback_says_how_it_goes"),
@@ -159,25 +163,25 @@ GOALS: tuple[Goal, ...] = (
     Goal("1. 10^6 fuzzed frames", ((_FUZZ, "TwentyThousandRandomTicksKeepEveryPromise"),),
          f"{_LONG_CPP}; `./run fuzz MINUTES tick`", "no promise broken"),
     Goal("2. every row, 200 seeds, two robots",
-         (("tests/test_faults.py", "test_the_mode_is_right_in_time_and_the_arm_recovers"),),
+         (("tests/study/test_faults.py", "test_the_mode_is_right_in_time_and_the_arm_recovers"),),
          "`proxcgal campaign faults --runs 200`",
          "as many seeds as the table above has"),
     Goal("3. no allocation in 10^6 ticks; p99.9; adversarial clouds",
          ((_CONTROLLER, "TickAllocatesNothing"),), f"{_LONG_CPP}; `./run bench`",
          "no allocation; times: benchmarks.md"),
     Goal("4. solver against an independent one, 10^5 stacks",
-         (("tests/test_solve.py", "test_agrees_with_the_formulas_on_random_stacks"),), _LONG_CPP,
+         ((_SOLVE_PY, "test_agrees_with_the_formulas_on_random_stacks"),), _LONG_CPP,
          "as the formulas, within rounding; the first level at its optimum"),
     Goal("5. 10^6 point and ray queries", ((_MESH, "NearestAgreesWithCgal"),
                                            (_MESH, "FirstHitAgreesWithCgal")), _LONG_CPP,
          "within 1e-9 m"),
     Goal("6. 1000 kills; a log cut at every byte",
-         (("tests/test_recording.py", "test_20_killed_writers_lose_no_acknowledged_tick"),
-          ("tests/test_recording.py", "test_a_file_cut_anywhere_gives_all_ticks_before_the_cut")),
+         ((_RECORDING, "test_20_killed_writers_lose_no_acknowledged_tick"),
+          (_RECORDING, "test_a_file_cut_anywhere_gives_all_ticks_before_the_cut")),
          _LONG_CPP,
          "1000 kills: no acknowledged tick lost; cut at every byte: all ticks before it read"),
     Goal("7. replays bit-identical",
-         (("tests/test_trial.py",
+         (("tests/trial/test_trial.py",
            "test_a_replay_gives_every_recorded_answer_again_bit_for_bit"),), _LONG_CPP,
          "every answer, to the bit"),
     Goal("8. ASan, UBSan, TSan clean, with and without NDEBUG",
@@ -251,11 +255,11 @@ def page(rows: tuple[Row, ...], summary: dict[str, Any], required: dict[str, str
     lines += ["", _LIMITS, "## Shown by tests", "", "| what goes wrong | what happens | shown by |"]
     lines.append("|---|---|---|")
     lines += [f"| {s.fault} | {s.required} | {_tests(s.tests)} |" for s in SHOWN]
-    if (given := summary.get("runs", 0)) < GOAL_RUNS:
+    if (runs := summary.get("runs", 0)) < GOAL_RUNS:
         lines += [
             "",
             "What the long tests gave on the state that is published is in docs/reliability.md, "
-            f"which takes {GOAL_RUNS} runs a row; here: {given}.",
+            f"which takes {GOAL_RUNS} runs a row; here: {runs}.",
         ]
         return "\n".join(lines) + "\n"
     lines += [

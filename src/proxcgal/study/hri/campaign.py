@@ -22,7 +22,7 @@ from proxcgal.study.hri.layouts import draw_layout
 from proxcgal.study.hri.metrics import analyse
 from proxcgal.study.hri.texts import captions, introduction, listings, verdicts
 from proxcgal.study.jobs import Report
-from proxcgal.study.kind import Kind, Wishes
+from proxcgal.study.kind import CampaignRequest, Kind
 from proxcgal.study.store import Row, Series
 from proxcgal.study.trials import identity, robot_of, simulate
 
@@ -39,7 +39,7 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def plan(wishes: Wishes) -> Campaign:
+def plan(request: CampaignRequest) -> Campaign:
     """Every controller with the same subjects, cells and noise; then all of it in moved cells.
 
     Raises:
@@ -51,12 +51,12 @@ def plan(wishes: Wishes) -> Campaign:
     phases: dict[str, str] = {}  # which scene has each
     recordings: list[str] = []
     compared: list[str] = []  # rows of the paper's tables
-    keys = [assignment.partition("=")[0].strip() for assignment in wishes.overrides]
+    keys = [assignment.partition("=")[0].strip() for assignment in request.overrides]
     for key in ("seed", "operator.subject", "operator.draw"):
         if key in keys:
             raise ConfigError(f"--set {key}=...: every subject has its own; --seed fixes them all")
-    for source in wishes.scenarios or SCENES:
-        base = _operated(source, wishes.overrides)
+    for source in request.scenarios or SCENES:
+        base = _operated(source, request.overrides)
         robot = robot_of(base)
         Setup.of(base, robot)  # tells what does not fit before anything is drawn
         task = task_of(base)
@@ -69,7 +69,7 @@ def plan(wishes: Wishes) -> Campaign:
                     "another name for it"
                 )
             phases[phase] = base.name
-        if base.operator.recording is not None and (wishes.runs > 1 or wishes.jitter):
+        if base.operator.recording is not None and (request.runs > 1 or request.jitter):
             raise ConfigError(
                 f"--scenario {source}: operator.recording = {base.operator.recording}: its person "
                 "is always the same, in the same place: needs --subjects 1 --no-jitter"
@@ -78,31 +78,31 @@ def plan(wishes: Wishes) -> Campaign:
         if base.operator.recording is not None and base.operator.who not in recordings:
             recordings.append(base.operator.who)
         compared += [task, *base.windows()] if is_the_papers(base) else []
-        for jitter in (False, True) if wishes.jitter else (False,):
-            for subject in range(1, wishes.runs + 1):
+        for jitter in (False, True) if request.jitter else (False,):
+            for subject in range(1, request.runs + 1):
                 own = (
-                    *wishes.overrides, f"operator.subject={subject}",
-                    f"operator.draw={wishes.seed}",
+                    *request.overrides, f"operator.subject={subject}",
+                    f"operator.draw={request.seed}",
                 )  # fmt: skip
                 layout = draw_layout(
-                    _operated(source, own), own, wishes.seed, subject, jitter=jitter
+                    _operated(source, own), own, request.seed, subject, jitter=jitter
                 )
                 redrawn += layout.redrawn
                 trials += [
                     Trial(
                         scenario=layout.scenario, source=source, overrides=layout.overrides,
-                        controller=controller, seed=wishes.seed + subject,
+                        controller=controller, seed=request.seed + subject,
                         robot_digest=robot.digest,
                         tags={
                             "task": task, "layout": "jittered" if jitter else "main",
                             "subject": subject,
                         },
                     )
-                    for controller in wishes.controllers or CONTROLLERS
+                    for controller in request.controllers or CONTROLLERS
                 ]  # fmt: skip
     description = {
-        "kind": "hri", "seed": wishes.seed, "scenarios": list(wishes.scenarios or SCENES),
-        "set": list(wishes.overrides), **scenes,
+        "kind": "hri", "seed": request.seed, "scenarios": list(request.scenarios or SCENES),
+        "set": list(request.overrides), **scenes,
     }  # fmt: skip
     settings = _plain_settings(trials[0].scenario.controller.model_dump(mode="json"))
     return Campaign(
@@ -176,7 +176,7 @@ def numbers(log: TrialLog, scenario: HriScenario) -> Row:
     mean, seen_mean = means.pop("cycle")
     setup = Setup.of(scenario, robot_of(scenario))
     finite = bool(np.isfinite(log.qd).all() and np.isfinite(log.q).all())
-    law = scenario.controller
+    settings = scenario.controller
     return {
         "mean_m": mean,
         "seen_mean_m": seen_mean,
@@ -194,8 +194,8 @@ def numbers(log: TrialLog, scenario: HriScenario) -> Row:
         "phase_means": json.dumps(means),
         "windows": json.dumps(scenario.windows()),
         "signals": json.dumps(scenario.signals()),
-        "d_min_m": law.d_min,
-        "buffer_m": law.buffer,
+        "d_min_m": settings.d_min,
+        "buffer_m": settings.buffer,
         "true_m": _series(log.true_m[samples]),
         "seen_m": _series(log.seen_m[samples]),
         "activation": _series(log.activation[samples]),

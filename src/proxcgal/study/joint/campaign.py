@@ -15,7 +15,7 @@ from proxcgal.study.jobs import Report
 from proxcgal.study.joint.figures import captions, figures
 from proxcgal.study.joint.metrics import COLUMNS, numbers_of
 from proxcgal.study.joint.texts import listings, verdicts
-from proxcgal.study.kind import Kind, Wishes
+from proxcgal.study.kind import CampaignRequest, Kind
 from proxcgal.study.store import Row
 from proxcgal.study.trials import identity, robot_of, simulate
 
@@ -49,7 +49,7 @@ PERCEPTIONS: dict[str, tuple[str, tuple[str, ...]]] = {
 }
 
 
-def plan(wishes: Wishes) -> Campaign:
+def plan(request: CampaignRequest) -> Campaign:
     """Known: each stack once, as nothing is drawn there. Sensed: the full stack for each seed.
 
     Raises:
@@ -57,9 +57,9 @@ def plan(wishes: Wishes) -> Campaign:
     """
     trials: list[Trial] = []
     scenes: dict[str, str] = {}
-    sources = wishes.scenarios or SCENES
+    sources = request.scenarios or SCENES
     for source in sources:
-        base = load_scenario(source, wishes.overrides)
+        base = load_scenario(source, request.overrides)
         if not isinstance(base, JointScenario):
             raise ConfigError(f"--scenario {source}: kind = {base.kind!r}; needs 'joint'")
         if plain(base.name) in {plain(trial.scenario.name) for trial in trials}:
@@ -73,29 +73,29 @@ def plan(wishes: Wishes) -> Campaign:
             init: str, stack: str, perception: str, controller: str, seed: int,
             changes: tuple[str, ...], source: str = source, digest: str = robot.digest,
         ) -> Trial:  # fmt: skip
-            overrides = (*wishes.overrides, f'initial=["{init}"]', *changes)
+            overrides = (*request.overrides, f'initial=["{init}"]', *changes)
             scenario = load_scenario(source, overrides)
             return Trial(
                 scenario=scenario, source=source, overrides=overrides, controller=controller,
                 seed=seed, robot_digest=digest,
                 tags={"scene": scenario.name, "init": init, "stack": stack,
-                      "perception": perception, "run": seed - wishes.seed},
+                      "perception": perception, "run": seed - request.seed},
             )  # fmt: skip
 
         for init in base.initial:
             trials += [
-                trial(init, stack, "known", "wb_known", wishes.seed, changes)
+                trial(init, stack, "known", "wb_known", request.seed, changes)
                 for stack, changes in STACKS.items()
             ]
             trials += [
-                trial(init, "full", perception, controller, wishes.seed + number, changes)
+                trial(init, "full", perception, controller, request.seed + number, changes)
                 for perception, (controller, changes) in PERCEPTIONS.items()
                 if controller in CONTROLLERS
-                for number in range(wishes.runs)
+                for number in range(request.runs)
             ]
     description = {
-        "kind": "joint", "seed": wishes.seed, "scenarios": list(sources),
-        "set": list(wishes.overrides), **scenes,
+        "kind": "joint", "seed": request.seed, "scenarios": list(sources),
+        "set": list(request.overrides), **scenes,
     }  # fmt: skip
     return Campaign(description=description, trials=trials, perform=perform, columns=COLUMNS)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from proxcgal.core.modes import HOLD
 from proxcgal.core.typing import Array
-from proxcgal.evaluation.ground_truth import Truth
+from proxcgal.evaluation.ground_truth import GroundTruth
 from proxcgal.evaluation.metrics import NOTHING_M
 from proxcgal.models import macro_micro
 
@@ -91,7 +91,7 @@ def _manipulability(robot: Robot, macro: int, q: Array) -> dict[str, float]:
 def _series(log: TrialLog, scenario: Scenario, robot: Robot, speed: Array) -> dict[str, Any]:
     period = 1.0 / scenario.simulation.control_hz
     rows = np.arange(0, len(log.time), max(round(SERIES_S / period), 1))
-    truth = Truth(robot, scenario.scene())
+    truth = GroundTruth(robot, scenario.scene())
     true = [truth(log.q[row], float(log.elapsed[row])).distance for row in rows]
 
     def rounded(values: Any) -> list[float | None]:

@@ -28,14 +28,14 @@ def draw_figures(scenario: Scenario, logs: Sequence[TrialLog], folder: Path, rep
     from proxcgal.scenario.setup import Setup
     from proxcgal.study.figures import png, time_figure
 
-    law = scenario.controller
+    settings = scenario.controller
     title = f"{scenario.name}: {logs[0].robot}, seed {logs[0].seed}"
     signals: Signals = ()
     if isinstance(scenario, HriScenario):
         signals = scenario.signals()
         title += f", {scenario.operator.who}"
     figure = time_figure(
-        logs, title=title, d_min=law.d_min, buffer=law.buffer, signals=signals,
+        logs, title=title, d_min=settings.d_min, buffer=settings.buffer, signals=signals,
         links=Setup.of(scenario).robot.link_names,
         faults=[(f.start, scenario.duration if f.end is None else f.end) for f in scenario.faults],
     )  # fmt: skip

@@ -23,7 +23,7 @@ from proxcgal.scenario.setup import Setup
 from proxcgal.study.bootstrap import median_interval
 from proxcgal.study.campaign import Campaign, Trial, plain
 from proxcgal.study.jobs import Report
-from proxcgal.study.kind import Kind, Wishes
+from proxcgal.study.kind import CampaignRequest, Kind
 from proxcgal.study.paired import ends_of, pairs
 from proxcgal.study.static.draws import draw_scene
 from proxcgal.study.static.memory_share import memory_summary
@@ -51,7 +51,7 @@ _AXES = ("x", "y", "z")
 _ANGLES = ("roll", "pitch", "yaw")
 
 
-def plan(wishes: Wishes) -> Campaign:
+def plan(request: CampaignRequest) -> Campaign:
     """Every controller on the same draws round each scene; the sensors' noise is the draw's own.
 
     Raises:
@@ -60,33 +60,33 @@ def plan(wishes: Wishes) -> Campaign:
     trials: list[Trial] = []
     redrawn: dict[str, dict[str, int]] = {}
     scenes: dict[str, str] = {}
-    sources = wishes.scenarios or SCENES
-    if "seed" in (assignment.partition("=")[0].strip() for assignment in wishes.overrides):
+    sources = request.scenarios or SCENES
+    if "seed" in (assignment.partition("=")[0].strip() for assignment in request.overrides):
         raise ConfigError("--set seed=...: every draw has its own; --seed fixes them all")
     for source in sources:
-        base = load_scenario(source, wishes.overrides)
+        base = load_scenario(source, request.overrides)
         robot = robot_of(base)
         Setup.of(base, robot)  # tells what does not fit before anything is drawn
         if plain(base.name) in map(plain, redrawn):
             raise ConfigError(f"--scenario {source}: there is another one named {plain(base.name)}")
         scenes |= identity(base, robot)
         reasons: Counter[str] = Counter()
-        for number in range(wishes.runs):
-            draw = draw_scene(base, robot, wishes.seed, number)
+        for number in range(request.runs):
+            draw = draw_scene(base, robot, request.seed, number)
             reasons += draw.redrawn
             trials += [
                 Trial(
                     scenario=draw.scenario, source=source,
-                    overrides=(*wishes.overrides, *draw.overrides), controller=controller,
-                    seed=wishes.seed + number, robot_digest=robot.digest,
+                    overrides=(*request.overrides, *draw.overrides), controller=controller,
+                    seed=request.seed + number, robot_digest=robot.digest,
                     tags={"scene": base.name, "draw": number},
                 )
                 for controller in CONTROLLERS
             ]  # fmt: skip
         redrawn[base.name] = dict(sorted(reasons.items()))
     description = {
-        "kind": "static", "seed": wishes.seed, "scenarios": list(sources),
-        "set": list(wishes.overrides), **scenes,
+        "kind": "static", "seed": request.seed, "scenarios": list(sources),
+        "set": list(request.overrides), **scenes,
     }  # fmt: skip
     return Campaign(
         description=description, trials=trials, perform=perform, columns=_columns(trials[0]),

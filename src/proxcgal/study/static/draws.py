@@ -96,7 +96,7 @@ def _text(values: Array) -> str:
 
 def _unfit(scenario: Scenario, robot: Robot) -> str | None:
     """Why a draw will not do; None where it does. What costs least is looked at first."""
-    q0, panel, law = np.array(scenario.q0), scenario.obstacles[0], scenario.controller
+    q0, panel, settings = np.array(scenario.q0), scenario.obstacles[0], scenario.controller
     if ((q0 < robot.q_min) | (q0 > robot.q_max)).any():
         return "start outside the joints' limits"
     goal = np.array(robot.tool_pose(q0))
@@ -112,7 +112,10 @@ def _unfit(scenario: Scenario, robot: Robot) -> str | None:
     vertices_O, triangles = panel.solid().core()
     plate = _core.MeshTree(placed(panel.pose(), vertices_O), triangles)
     for link in surfaces.moving:
-        if plate.distance(surfaces.trees[link], poses_W[link], law.d_min + law.buffer)[0] < np.inf:
+        if (
+            plate.distance(surfaces.trees[link], poses_W[link], settings.d_min + settings.buffer)[0]
+            < np.inf
+        ):
             return "panel too near at the start"
     if not reachable(robot, q0, goal):
         return "goal out of reach"

@@ -11,7 +11,7 @@ from proxcgal.core.errors import ConfigError
 from proxcgal.core.typing import Array
 from proxcgal.models import Robot, load_robot
 from proxcgal.scenario.loading import Scenario
-from proxcgal.sim.static_scan import Snapshot, take_snapshot
+from proxcgal.sim.static_scan import StaticScan, scan_static
 
 SCENARIOS = ("timing_ur10e", "timing_panda")
 VERTICES = (100, 300, 1000, 3000, 10000)  # a link
@@ -36,7 +36,7 @@ class Inputs:
     points_W: Array  # (n, 3) [m] Algorithm 1: measured points
     tolerance: Array  # (n,) [m] Algorithm 1: epsilon
     environment_W: Array  # (m, 3) [m] Algorithm 2
-    seen: Snapshot  # what they come from: scans, sensors, goal
+    seen: StaticScan  # what they come from: scans, sensors, goal
 
 
 def grid_inputs(
@@ -58,7 +58,7 @@ def grid_inputs(
         ModelError: the robot's description.
         SimulationError: the simulator warned.
     """
-    snapshot = take_snapshot(scenario, scans)
+    snapshot = scan_static(scenario, scans)
     cropped = {cloud: snapshot.within(REACH[cloud]) for cloud in clouds}
     empty = [
         f"scenario {scenario.name}: the cloud {cloud!r} (rays up to {REACH[cloud]:g} m) has no "

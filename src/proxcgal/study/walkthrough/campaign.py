@@ -14,7 +14,7 @@ from proxcgal.evaluation.metrics import Summary
 from proxcgal.scenario.walkthrough import WalkScenario
 from proxcgal.study.campaign import Campaign, Trial
 from proxcgal.study.figures import DASHED, DPI, GREY
-from proxcgal.study.kind import Kind, Listing, Wishes
+from proxcgal.study.kind import CampaignRequest, Kind, Listing
 from proxcgal.study.trials import robot_of
 from proxcgal.study.walkthrough.draws import OWN, WISHES, draw_walk
 from proxcgal.trial.walkthrough.playback import play
@@ -36,20 +36,20 @@ COLOURS = {"overspeed": "#D55E00", "too_close": "#0072B2", "closing_fast": "#009
 _STOPPED = pl.col("tripped").cast(pl.String) != "none"
 
 
-def plan(wishes: Wishes) -> Campaign:
+def plan(request: CampaignRequest) -> Campaign:
     """Operators in turn compliant, too fast, too near, closing in too fast.
 
     Raises:
         ProxError: an assignment that does not fit; no compliant path found.
     """
-    if wishes.scenarios:
+    if request.scenarios:
         raise ConfigError("--scenario: walkthrough draws round its own four scenes")
     trials: list[Trial] = []
     scenes: dict[str, str] = {}
     redrawn = 0
-    for number in range(wishes.runs):
+    for number in range(request.runs):
         wish = list(WISHES)[number % len(WISHES)]
-        draw = draw_walk(wish, wishes.seed, number // len(WISHES), wishes.overrides)
+        draw = draw_walk(wish, request.seed, number // len(WISHES), request.overrides)
         robot = robot_of(draw.scenario)
         redrawn += draw.redrawn
         if wish not in scenes:
@@ -57,13 +57,13 @@ def plan(wishes: Wishes) -> Campaign:
         trials.append(
             Trial(
                 scenario=draw.scenario, source=draw.source, overrides=draw.overrides,
-                controller="", seed=wishes.seed + number, robot_digest=robot.digest,
+                controller="", seed=request.seed + number, robot_digest=robot.digest,
                 tags={"wish": wish, "run": number},
             )
         )  # fmt: skip
     description = {
-        "kind": "walkthrough", "seed": wishes.seed, "scenarios": list(WISHES.values()),
-        "set": list(wishes.overrides), **scenes,
+        "kind": "walkthrough", "seed": request.seed, "scenarios": list(WISHES.values()),
+        "set": list(request.overrides), **scenes,
     }  # fmt: skip
     return Campaign(
         description=description, trials=trials, perform=perform, columns=COLUMNS,
@@ -108,14 +108,14 @@ def perform(trial: Trial, report: Report) -> Row:
 def analyse(table: pl.DataFrame, campaign: Campaign) -> Summary:
     """The numbers of `summary.json`: by what operators did, and over all stops."""
     done = table.filter(pl.col("error").is_null())
-    wishes = {
+    request = {
         str(name): _of(part) for (name,), part in done.group_by(["wish"], maintain_order=True)
     }
     stopped = done.filter(_STOPPED)
     return {
         "robot": campaign.trials[0].scenario.robot,
         "redrawn": campaign.notes["redrawn"],
-        "wishes": wishes,
+        "wishes": request,
         "false_trips": int(done["false_trip"].sum()),
         "missed": int(done["missed"].sum()),
         "overruns": int(done["overrun"].sum()),

@@ -12,7 +12,7 @@ from proxcgal.core.errors import ConfigError
 from proxcgal.scenario.loading import load_scenario
 from proxcgal.scenario.walkthrough import WalkScenario
 from proxcgal.study.trials import robot_of
-from proxcgal.trial.walkthrough.intended_path import Wish
+from proxcgal.trial.walkthrough.intended_path import IntendedPath
 from proxcgal.trial.walkthrough.setup import WalkSetup
 
 #: What an operator does, and the scenario that it is drawn round.
@@ -148,7 +148,7 @@ def _beyond(scenario: WalkScenario) -> str | None:
     """Why a wish is not compliant; None where it is. The arm is thought to follow it exactly."""
     setup = WalkSetup.of(scenario, robot_of(scenario))
     robot, keys = setup.robot, scenario.guard
-    wish = Wish.of(scenario.legs, _STEP)
+    wish = IntendedPath.of(scenario.legs, _STEP)
     bounds = setup.bounds
     q, qd = setup.q0.copy(), np.zeros(robot.n_q)
     guard = setup.make_guard()

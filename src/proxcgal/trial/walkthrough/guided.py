@@ -15,7 +15,7 @@ from proxcgal.sim.source import SimulatedSource
 from proxcgal.sim.tick import TickInput
 from proxcgal.trial.walkthrough.grip import Grip
 from proxcgal.trial.walkthrough.hand import Hand, rotation_of
-from proxcgal.trial.walkthrough.intended_path import Wish
+from proxcgal.trial.walkthrough.intended_path import IntendedPath
 
 if TYPE_CHECKING:
     from proxcgal.evaluation.trial_log import TrialLog
@@ -38,7 +38,7 @@ class GuidedSource(SimulatedSource):
             _core.AdmittanceConfig(**scenario.admittance.model_dump())
         )
         self._pace = 1.0 / scenario.simulation.control_hz
-        wish = Wish.of(scenario.legs, self._pace)
+        wish = IntendedPath.of(scenario.legs, self._pace)
         start = np.array(setup.robot.tool_pose(setup.q0))
         self._hand = Hand(scenario.hand, wish, start, self._pace, seed)
         self._cycle = 0
@@ -50,11 +50,11 @@ class GuidedSource(SimulatedSource):
 
     def read(self) -> TickInput | None:
         """The next tick's inputs: the goal is one step of the hand ahead of the tool."""
-        given = super().read()
-        if given is None:
+        inputs = super().read()
+        if inputs is None:
             return None
-        T = np.array(self._robot.tool_pose(given.q))
-        self._J = np.array(self._robot.tool_jacobian(given.q))
+        T = np.array(self._robot.tool_pose(inputs.q))
+        self._J = np.array(self._robot.tool_jacobian(inputs.q))
         tool = T[:3, 3], T[:3, :3], self._twist
         if self.grip is None:
             force, engaged = self._hand.force(self._cycle, *tool), True
@@ -65,7 +65,7 @@ class GuidedSource(SimulatedSource):
         goal = T.copy()
         goal[:3, 3] += wanted[:3] / self._gain
         goal[:3, :3] = rotation_of(wanted[3:] / self._gain) @ T[:3, :3]
-        return replace(given, goal=goal)
+        return replace(inputs, goal=goal)
 
     def take_over(self) -> Grip:
         """The hand that somebody moves from now on; it holds nothing yet."""
@@ -82,7 +82,7 @@ class GuidedSource(SimulatedSource):
 
 def off_path(scenario: GuidedScenario, log: TrialLog) -> Array:
     """(n,) how far the tool is from the nearest point of the path that the hand wishes [m]."""
-    wish = Wish.of(scenario.legs, 0.005)
+    wish = IntendedPath.of(scenario.legs, 0.005)
     path = log.tool_W[0] + wish.position
     found: Array = np.array([np.linalg.norm(path - tool, axis=1).min() for tool in log.tool_W])
     return found

@@ -8,7 +8,7 @@ import numpy as np
 
 from proxcgal.core.typing import Array
 from proxcgal.scenario.walkthrough import Hand as HandKeys
-from proxcgal.trial.walkthrough.intended_path import Wish
+from proxcgal.trial.walkthrough.intended_path import IntendedPath
 
 _TREMOR_HZ = (8.0, 12.0)
 _TONES = 6  # sinusoids of random frequency and phase that make a tremor
@@ -81,7 +81,9 @@ class Pull:
 class Hand:
     """Pulls the tool along a wished path; lets go once it has noticed that the arm has stopped."""
 
-    def __init__(self, keys: HandKeys, wish: Wish, start: Array, period: float, seed: int) -> None:
+    def __init__(
+        self, keys: HandKeys, wish: IntendedPath, start: Array, period: float, seed: int
+    ) -> None:
         """Args: `start` (4, 4) T_WT where the path begins; the seed fixes the tremor."""
         self._pull = Pull(keys, period)
         self._wish = wish

@@ -13,7 +13,7 @@ from proxcgal.scenario.walkthrough import Leg
 
 
 @dataclass(frozen=True, eq=False)
-class Wish:
+class IntendedPath:
     """Where the tool should be, n cycles long."""
 
     position: Array  #: (n, 3) [m] from the start, base axes

@@ -10,7 +10,7 @@ import numpy as np
 from proxcgal import _core
 from proxcgal.core.typing import Array, Bools
 from proxcgal.scenario.walkthrough import Guard
-from proxcgal.sim.physics import Physics, Truth
+from proxcgal.sim.physics import GroundTruth, Physics
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,7 +72,7 @@ class WalkLog:
         physics: Physics,
         out: _core.GuardOutput,
         force: Array | None,
-        truth: Truth | None,
+        truth: GroundTruth | None,
         bounds: tuple[Array, Array],
     ) -> None:
         """One cycle more; `bounds` are qd_UB and qdd_UB, for what is true."""

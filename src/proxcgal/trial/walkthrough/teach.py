@@ -10,7 +10,7 @@ from proxcgal.core.errors import ConfigError
 from proxcgal.scenario.walkthrough import WalkScenario
 from proxcgal.trial.walkthrough.cell import Cell
 from proxcgal.trial.walkthrough.hand import Hand
-from proxcgal.trial.walkthrough.intended_path import Wish
+from proxcgal.trial.walkthrough.intended_path import IntendedPath
 from proxcgal.trial.walkthrough.log import WalkLog
 from proxcgal.trial.walkthrough.poses import PoseRecorder
 from proxcgal.trial.walkthrough.setup import PERIOD, WalkSetup
@@ -28,7 +28,7 @@ def check_duration(scenario: WalkScenario) -> None:
         ConfigError: it takes longer than `duration`.
     """
     for legs, rules in ((scenario.legs, ""), (scenario.slow().legs, " by the hand-guiding rules")):
-        path = PERIOD * len(Wish.of(legs, PERIOD))
+        path = PERIOD * len(IntendedPath.of(legs, PERIOD))
         needed = START_AT + path + scenario.hand.reaction_time + 2.0 * SETTLE
         if scenario.duration < needed:
             raise ConfigError(
@@ -61,7 +61,7 @@ def teach(
     scenario = setup.scenario
     cell = Cell(setup)
     physics, bounds = cell.physics, cell.bounds
-    wish = Wish.of(scenario.legs, PERIOD)
+    wish = IntendedPath.of(scenario.legs, PERIOD)
     start = np.array(setup.robot.tool_pose(setup.q0))
     hand = Hand(scenario.hand, wish, start, PERIOD, seed)
     begin = round(START_AT / PERIOD)
