@@ -22,10 +22,10 @@ from browser import chromium, until
 
 from proxcgal.core.provenance import machine
 from proxcgal.scenario.loading import Scenario, load_scenario
-from proxcgal.viewer.access import close, serve
 from proxcgal.viewer.live_page import LivePage
 from proxcgal.viewer.messages import Update
-from proxcgal.viewer.simulation import FRAME_HZ, simulate
+from proxcgal.viewer.page_server import close, serve
+from proxcgal.viewer.simulation import FRAME_HZ, run_simulation
 
 CANVAS = (640, 400)  # [px]
 PANEL = 340  # [px] that the controls take beside it
@@ -44,29 +44,29 @@ def alone(scene: Scenario, seconds: float) -> Update:
     """The simulation in its process, asked once, at the end."""
     context = multiprocessing.get_context("spawn")
     link, theirs = context.Pipe()
-    process = context.Process(target=simulate, args=(theirs, scene, "wb", 1.0), daemon=True)
+    process = context.Process(target=run_simulation, args=(theirs, scene, "wb", 1.0), daemon=True)
     process.start()
     theirs.close()
-    while (told := link.recv()).model is None:
-        assert not told.failed, told.failed
+    while (update := link.recv()).model is None:
+        assert not update.failed, update.failed
     clock.sleep(seconds)
     while link.poll():
         link.recv()
     link.send(None)
-    told = link.recv()
+    update = link.recv()
     link.close()
     process.join()
-    return told
+    return update
 
 
 def served(scene: Scenario, seconds: float) -> Update:
     """The same with the page drawn, and nobody looking on."""
-    server, gate = serve("127.0.0.1", 0, label="bench")
-    page = LivePage(server, gate, scene, "wb")
+    server, access = serve("127.0.0.1", 0, label="bench")
+    page = LivePage(server, access, scene, "wb")
     try:
-        assert until(lambda: page.told.moment is not None, 120.0)
+        assert until(lambda: page.last.moment is not None, 120.0)
         clock.sleep(seconds)
-        return page.told
+        return page.last
     finally:
         page.close()
         close(server)
@@ -74,34 +74,34 @@ def served(scene: Scenario, seconds: float) -> Update:
 
 def looked_at(scene: Scenario, seconds: float) -> tuple[Update, dict[str, float]]:
     """The same with the page open in a browser on the same machine."""
-    server, gate = serve("127.0.0.1", 0, label="bench")
-    page = LivePage(server, gate, scene, "wb")
+    server, access = serve("127.0.0.1", 0, label="bench")
+    page = LivePage(server, access, scene, "wb")
     try:
         with chromium(CANVAS[0] + PANEL, CANVAS[1]) as open_tab:
             tab = open_tab()
             tab.open(f"http://127.0.0.1:{server.get_port()}/")
             assert until(lambda: len(server.get_clients()) == 1, 120.0)
-            assert until(lambda: page.told.moment is not None, 120.0)
+            assert until(lambda: page.last.moment is not None, 120.0)
             box = tab.page.locator("canvas").first.bounding_box()
             clock.sleep(0.5 * seconds)
             drawn, since = page.drawn, clock.monotonic()
             fps = tab.frames_per_second(0.5 * seconds)
             moments = (page.drawn - drawn) / (clock.monotonic() - since)
-        assert page.told.moment is not None
-        points = len(page.told.moment.kept_W) + len(page.told.moment.removed_W)
-        return page.told, {
+        assert page.last.moment is not None
+        points = len(page.last.moment.kept_W) + len(page.last.moment.removed_W)
+        return page.last, {
             "fps": fps, "moments_per_s": moments, "points": points,
-            "links": len(page.told.moment.links_W), "width": box["width"], "height": box["height"],
+            "links": len(page.last.moment.links_W), "width": box["width"], "height": box["height"],
         }  # fmt: skip
     finally:
         page.close()
         close(server)
 
 
-def figures(told: Update) -> dict[str, float]:
+def figures(update: Update) -> dict[str, float]:
     return {
-        "tick_cpu_us": told.cpu_us, "late_median_us": told.late_us[0],
-        "late_p99_us": told.late_us[1], "real_time": told.real_time,
+        "tick_cpu_us": update.cpu_us, "late_median_us": update.late_us[0],
+        "late_p99_us": update.late_us[1], "real_time": update.real_time,
     }  # fmt: skip
 
 
@@ -116,8 +116,8 @@ def main() -> int:
     for _ in range(options.repeats):
         without.append(figures(alone(scene, options.seconds)))
         unseen.append(figures(served(scene, options.seconds)))
-        told, page = looked_at(scene, options.seconds)
-        beside.append(figures(told))
+        update, page = looked_at(scene, options.seconds)
+        beside.append(figures(update))
         seen.append(page)
     middle = {
         name: {key: float(np.median([row[key] for row in rows])) for key in rows[0]}

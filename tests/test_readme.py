@@ -42,7 +42,7 @@ def test_the_python_blocks_run_in_their_order(tmp_path: Path) -> None:
 @pytest.mark.parametrize("line", [c for c in commands() if c.startswith("proxcgal ")])
 def test_a_command_of_the_readme_parses(line: str) -> None:
     _, command, *arguments = shlex.split(line)
-    assert main.parse(command, arguments) is not None
+    assert main.parse_options(command, arguments) is not None
 
 
 def test_every_command_of_the_docs_parses() -> None:
@@ -55,7 +55,7 @@ def test_every_command_of_the_docs_parses() -> None:
     assert len(set(lines.values())) >= 3
     for line in lines:
         _, command, *arguments = shlex.split(line)
-        assert main.parse(command, arguments) is not None, line
+        assert main.parse_options(command, arguments) is not None, line
 
 
 @pytest.mark.parametrize("document", ["joint_robot.md"])

@@ -340,9 +340,9 @@ def test_beside_a_person_the_still_shows_the_least_distance_of_all_runs(
     run, row = np.unravel_index(int(np.argmin(true)), np.shape(true))
     setup = Setup.of(recordings[0].settings.scenario)
     end = recordings[0].ticks[-1].inputs.time
-    assert motion_picture._telling(setup, recordings) == (end, -1)
+    assert motion_picture._time_shown(setup, recordings) == (end, -1)
     monkeypatch.setattr(motion_picture, "HriScenario", type(setup.scenario))
-    assert motion_picture._telling(setup, recordings) == (
+    assert motion_picture._time_shown(setup, recordings) == (
         recordings[run].ticks[row].inputs.time,
         run,
     )

@@ -18,7 +18,8 @@ from PIL import Image
 import proxcgal as px
 from proxcgal.evaluation import metrics
 from proxcgal.evaluation.coverage import Coverage
-from proxcgal.study import figures
+from proxcgal.study.plotting import CONTROLLER_COLOURS, png
+from proxcgal.study.time_figure import time_figure
 
 HZ = 100
 
@@ -180,7 +181,7 @@ def test_a_links_colour_is_the_same_in_every_run() -> None:
 
     def colours(*held: str) -> dict[str, Any]:
         log = make_log(control_link=[held[0]] * 300 + [held[-1]] * 300)
-        figure = figures.time_figure([log], title="", d_min=0.2, buffer=0.1, links=links)
+        figure = time_figure([log], title="", d_min=0.2, buffer=0.1, links=links)
         found = [patch.get_facecolor() for patch in figure.axes[2].patches]
         found += [each.get_facecolor()[0] for each in figure.axes[2].collections]
         return dict(zip(held, map(tuple, found), strict=False))
@@ -192,9 +193,9 @@ def test_a_links_colour_is_the_same_in_every_run() -> None:
 
 def test_modes_and_faults_are_drawn_with_a_legend_where_there_are_any() -> None:
     calm, held = make_log(), make_log(mode=np.r_[np.zeros(300, int), np.full(300, 2)])
-    plain = figures.time_figure([calm], title="", d_min=0.2, buffer=0.1)
+    plain = time_figure([calm], title="", d_min=0.2, buffer=0.1)
     assert len(plain.axes) == 3
-    figure = figures.time_figure([held], title="", d_min=0.2, buffer=0.1, faults=[(2.5, 4.0)])
+    figure = time_figure([held], title="", d_min=0.2, buffer=0.1, faults=[(2.5, 4.0)])
     assert figure.axes[3].get_ylabel() == "mode"
     (legend,) = [each for each in figure.axes[0].artists if isinstance(each, Legend)]
     assert [text.get_text() for text in legend.get_texts()] == ["HOLD", "fault"]
@@ -205,23 +206,23 @@ def test_figures_of_short_runs_print_no_notes_of_their_layout() -> None:
     figure.subplots().set_ylabel("a label that is longer than the figure is high")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        figures.png(figure)
+        png(figure)
 
 
 def pixels(figure: Any) -> NDArray[np.uint8]:
-    return np.asarray(Image.open(io.BytesIO(figures.png(figure))).convert("RGB"))
+    return np.asarray(Image.open(io.BytesIO(png(figure))).convert("RGB"))
 
 
 def test_the_figure_over_time_shows_both_controllers_in_their_colours(both: list[Any]) -> None:
-    figure = figures.time_figure(both, title="front_plane", d_min=0.2, buffer=0.1)
+    figure = time_figure(both, title="front_plane", d_min=0.2, buffer=0.1)
     image = pixels(figure)
     for name in ("wb", "sm"):
-        colour = [int(figures.COLOURS[name][i : i + 2], 16) for i in (1, 3, 5)]
+        colour = [int(CONTROLLER_COLOURS[name][i : i + 2], 16) for i in (1, 3, 5)]
         assert (np.abs(image.astype(int) - colour).max(axis=2) < 8).sum() > 1000
 
 
 def test_every_axis_of_the_figure_over_time_has_a_unit(both: list[Any]) -> None:
-    figure = figures.time_figure(both, title="", d_min=0.2, buffer=0.1)
+    figure = time_figure(both, title="", d_min=0.2, buffer=0.1)
     assert figure.axes[0].get_ylabel() == "minimum distance [m]"
     assert figure.axes[1].get_ylabel() == "activation [-]"
     assert figure.axes[-1].get_xlabel() == "time [s]"
@@ -229,16 +230,14 @@ def test_every_axis_of_the_figure_over_time_has_a_unit(both: list[Any]) -> None:
 
 def test_a_distance_to_nothing_is_a_gap_in_the_curve() -> None:
     log = make_log()
-    figure = figures.time_figure([log], title="", d_min=0.2, buffer=0.1)
+    figure = time_figure([log], title="", d_min=0.2, buffer=0.1)
     seen = next(line for line in figure.axes[0].lines if len(line.get_xdata()) == len(log.time))
     assert np.isnan(seen.get_ydata()[:50]).all()
     assert np.isfinite(seen.get_ydata()[50:]).all()
 
 
 def test_the_same_figure_is_the_same_file(both: list[Any]) -> None:
-    files = {
-        figures.png(figures.time_figure(both, title="", d_min=0.2, buffer=0.1)) for _ in range(2)
-    }
+    files = {png(time_figure(both, title="", d_min=0.2, buffer=0.1)) for _ in range(2)}
     assert len(files) == 1
 
 

@@ -8,8 +8,8 @@ from proxcgal.models import macro_micro
 from proxcgal.scenario.joint import CONFIGURATIONS, JointScenario
 from proxcgal.scenario.loading import load_scenario, parse_scenario
 from proxcgal.scenario.setup import Setup
-from proxcgal.study.joint.metrics import COLUMNS, numbers_of
-from proxcgal.study.trials import simulate
+from proxcgal.study.joint.metrics import COLUMNS, joint_metrics
+from proxcgal.study.trial_simulation import simulate_trial
 
 NOTHING = np.empty((0, 3))
 FOLDED = np.array(CONFIGURATIONS["free"])
@@ -157,7 +157,9 @@ def test_a_joint_scenario_written_out_is_the_same_again() -> None:
 @pytest.mark.parametrize("init", ["free", "jl"])
 def test_the_gate_is_passed_and_told_in_numbers(joint: px.Robot, init: str) -> None:
     scenario = load_scenario("joint_gate", [f'initial=["{init}"]', "simulation.control_hz=125.0"])
-    numbers = numbers_of(simulate(scenario, "wb_known", 0, lambda _: None), scenario, joint)
+    numbers = joint_metrics(
+        simulate_trial(scenario, "wb_known", 0, lambda _: None), scenario, joint
+    )
     assert tuple(numbers) == COLUMNS
     assert numbers["succeeded"]
     assert numbers["true_min_m"] >= 0.05  # type: ignore[operator]
@@ -166,7 +168,7 @@ def test_the_gate_is_passed_and_told_in_numbers(joint: px.Robot, init: str) -> N
 
 def test_a_trapped_run_ends_with_what_holds_it(joint: px.Robot) -> None:
     scenario = load_scenario("joint_behind", ['initial=["jl"]', "simulation.control_hz=125.0"])
-    log = simulate(scenario, "wb_known", 0, lambda _: None)
+    log = simulate_trial(scenario, "wb_known", 0, lambda _: None)
     assert log.ending is not None
     assert log.ending.outcome == "aborted"
     assert log.ending.reason.startswith("held off by the obstacle (ur10e_")
@@ -183,5 +185,5 @@ def test_a_trapped_run_ends_with_what_holds_it(joint: px.Robot) -> None:
 def test_memory_keeps_the_wrist_off_what_only_the_forearm_saw(joint: px.Robot) -> None:
     # Half a second after it was seen last, slowly, no sensor looks where the wrist goes.
     scenario = load_scenario("joint_behind", ['perception="sensed"', 'initial=["jl"]'])
-    log = simulate(scenario, "wb_memory", 2, lambda _: None)
+    log = simulate_trial(scenario, "wb_memory", 2, lambda _: None)
     assert log.summary()["true_min_m"] >= 0.05

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 import proxcgal as px
-from proxcgal.report.report import write_report
+from proxcgal.report.write_report import write_report
 
 NASTY = '<script>alert("&")</script>'
 VOID = {"meta", "img", "br", "hr", "link", "input"}

@@ -11,7 +11,7 @@ from browser import Tab, until
 from test_report import checked, make_run
 
 from proxcgal.recording.writer import Recorder
-from proxcgal.report.report import write_report
+from proxcgal.report.write_report import write_report
 from proxcgal.scenario.loading import load_scenario
 from proxcgal.trial.trial import run_trial
 from proxcgal.viewer.report_scene import replay_scene, still_scene

@@ -18,6 +18,8 @@ import proxcgal as px
 from proxcgal.cli import serve
 from proxcgal.cli.main import main
 from proxcgal.core.errors import ConfigError
+from proxcgal.server import tcp_server
+from proxcgal.server.tcp_server import TcpServer
 
 REACHED = (3.0, 0.291, 1.05)
 PATIENCE = 120.0  # [s] for what has to come, however busy the machine is
@@ -33,7 +35,7 @@ class Served:
         ready = threading.Event()
 
         async def work() -> None:
-            front = serve.Front(self.robot)
+            front = TcpServer(self.robot)
             listening = await front.listen("127.0.0.1", 0)
             self.port = listening.sockets[0].getsockname()[1]
             ready.set()
@@ -208,18 +210,20 @@ def test_what_a_goal_lacks_is_named(served: Served) -> None:
 
 def test_a_message_without_end_is_cut_off(served: Served) -> None:
     client = served.client()
-    client.send(b"x" * (serve.LINE_BYTES + 2000))
+    client.send(b"x" * (tcp_server.LINE_BYTES + 2000))
     assert "at most" in str(client.read()["reason"])
     assert client.read() == {}
     client.close()
 
 
 def test_a_client_may_send_a_burst_and_then_at_a_rate() -> None:
-    client = serve._Client(writer=None)  # type: ignore[arg-type]
-    assert [client.spend(100.0) for _ in range(serve.BURST + 1)] == [True] * serve.BURST + [False]
-    assert not client.spend(100.0 + 0.9 / serve.RATE)
-    assert client.spend(100.0 + 1.1 / serve.RATE)
-    assert sum(client.spend(200.0) for _ in range(3 * serve.BURST)) == serve.BURST
+    client = tcp_server._Client(writer=None)  # type: ignore[arg-type]
+    assert [client.spend(100.0) for _ in range(tcp_server.BURST + 1)] == [
+        True
+    ] * tcp_server.BURST + [False]
+    assert not client.spend(100.0 + 0.9 / tcp_server.RATE)
+    assert client.spend(100.0 + 1.1 / tcp_server.RATE)
+    assert sum(client.spend(200.0) for _ in range(3 * tcp_server.BURST)) == tcp_server.BURST
 
 
 def test_a_flood_is_cut_off_and_the_others_go_on(served: Served) -> None:
@@ -231,7 +235,7 @@ def test_a_flood_is_cut_off_and_the_others_go_on(served: Served) -> None:
         answers.append(message["type"])
     took = clock.monotonic() - began
     assert answers[-1] == "error"
-    assert len(answers) <= serve.BURST + serve.RATE * took + 2
+    assert len(answers) <= tcp_server.BURST + tcp_server.RATE * took + 2
     other.send({"op": "state"})
     assert other.read()["type"] == "state"
     flood.close()
@@ -239,7 +243,7 @@ def test_a_flood_is_cut_off_and_the_others_go_on(served: Served) -> None:
 
 
 def test_clients_beyond_the_bound_are_turned_away(served: Served) -> None:
-    clients = [served.client() for _ in range(serve.CLIENTS)]
+    clients = [served.client() for _ in range(tcp_server.CLIENTS)]
     for client in clients:
         client.send({"op": "state"})
         assert client.read()["type"] == "state"

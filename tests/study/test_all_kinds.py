@@ -1,15 +1,13 @@
 """What holds of every kind of campaign: nothing that its trials do may cost its folder."""
 
-from importlib import import_module
-
 import pytest
 
-from proxcgal.cli.campaign import KINDS
 from proxcgal.study.campaign import Ended
-from proxcgal.study.figures import png
-from proxcgal.study.kind import CampaignRequest, Kind
-from proxcgal.study.store import Outcome
-from proxcgal.study.table import parquet, tidy
+from proxcgal.study.campaign_kind import CampaignRequest
+from proxcgal.study.campaign_store import Outcome
+from proxcgal.study.kinds import KINDS
+from proxcgal.study.plotting import png
+from proxcgal.study.trials_table import parquet_bytes, trials_table
 
 FEWEST = {
     "static": CampaignRequest(runs=1, seed=0, scenarios=("front_plane",)),
@@ -22,15 +20,15 @@ FEWEST = {
 
 @pytest.mark.parametrize("name", KINDS)
 def test_a_campaign_of_which_every_trial_fails_is_summed_up_all_the_same(name: str) -> None:
-    kind: Kind = import_module(KINDS[name]).KIND
+    kind = KINDS[name]
     campaign = kind.plan(FEWEST[name])
     failed = [
         Ended(trial=trial, outcome=Outcome(key=trial.key, error="MuJoCo warned"))
         for trial in campaign.trials
     ]
-    table = tidy(failed, campaign.columns)
+    table = trials_table(failed, campaign.columns)
     summary = {"failed": failed, "seed": 0, "runs": 1, **kind.analyse(table, campaign)}
-    assert parquet(table)
+    assert parquet_bytes(table)
     assert kind.worst(table) == []
     for listing in kind.listings(summary):
         assert str(listing)
@@ -38,6 +36,5 @@ def test_a_campaign_of_which_every_trial_fails_is_summed_up_all_the_same(name: s
     for figure in kind.figures(table, summary).values():
         assert png(figure)
     assert isinstance(kind.captions(summary), dict)
-    if kind.pages is not None:
-        (page,) = kind.pages(summary).values()
+    for page in kind.pages(summary).values():
         assert f"{len(failed)} more runs did not come to their end" in page

@@ -19,10 +19,11 @@ import pytest
 
 import proxcgal as px
 from proxcgal.scenario.loading import load_scenario
-from proxcgal.study.campaign import Campaign, Trial, run_campaign, unfinished
+from proxcgal.study.campaign import Campaign, Trial
+from proxcgal.study.campaign_store import CampaignStore, Outcome
+from proxcgal.study.execution import perform_trials, unfinished
 from proxcgal.study.static import campaign as static_campaign
-from proxcgal.study.store import Outcome, Store
-from proxcgal.study.trials import robot_of
+from proxcgal.study.trial_simulation import robot_of
 from proxcgal.study.workers import Pool
 
 SMALL = ("--scenario", "front_plane", "--runs", "2", "--set", "duration=0.2")
@@ -169,12 +170,12 @@ def test_a_trial_whose_worker_was_killed_is_run_again(
     performs: ModuleType, planned: Campaign, tmp_path: Path
 ) -> None:
     campaign = replace(planned, perform=performs.dies_once, columns=["number"])
-    with Pool(2) as pool, Store(tmp_path / "store", {}) as store:
-        ended = run_campaign(campaign, store, pool)
+    with Pool(2) as pool, CampaignStore(tmp_path / "store", {}) as store:
+        ended = perform_trials(campaign, store, pool)
     assert (tmp_path / "died").exists()
     assert [each.outcome.error for each in ended] == [None] * 8
-    with Pool(1) as pool, Store(tmp_path / "other", {}) as store:
-        alone = run_campaign(replace(campaign, perform=performs.numbers), store, pool)
+    with Pool(1) as pool, CampaignStore(tmp_path / "other", {}) as store:
+        alone = perform_trials(replace(campaign, perform=performs.numbers), store, pool)
     assert [each.outcome.row for each in ended] == [each.outcome.row for each in alone]
 
 
@@ -186,8 +187,8 @@ def test_a_trial_that_fails_stops_no_other(
     performs: ModuleType, planned: Campaign, tmp_path: Path, perform: str, error: str
 ) -> None:
     campaign = replace(planned, perform=getattr(performs, perform), columns=["number"])
-    with Pool(2) as pool, Store(tmp_path / "store", {}) as store:
-        ended = run_campaign(campaign, store, pool)
+    with Pool(2) as pool, CampaignStore(tmp_path / "store", {}) as store:
+        ended = perform_trials(campaign, store, pool)
         left = unfinished(campaign, store)
     failed = [each for each in ended if each.outcome.row is None]
     assert [each.trial.name for each in failed] == ["front_plane-0-sm"]
@@ -198,14 +199,14 @@ def test_a_trial_that_fails_stops_no_other(
 def test_a_failed_trial_is_told_with_what_repeats_it(
     call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    real = static_campaign.simulate
+    real = static_campaign.simulate_trial
 
     def simulate(scenario: object, controller: str, *rest: object, **keys: object) -> object:
         if controller == "sm":
             raise px.SimulationError("MuJoCo warned")
         return real(scenario, controller, *rest, **keys)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(static_campaign, "simulate", simulate)
+    monkeypatch.setattr(static_campaign, "simulate_trial", simulate)
     answer = call(*ONE, "--keep", "none", "--out", "here")
     assert answer.code == 1
     command = answer.err.splitlines()[-1].removeprefix("proxcgal:").strip()
@@ -224,7 +225,7 @@ def test_a_campaign_of_which_every_trial_fails_still_tells_so(
     def simulate(*_: object, **__: object) -> object:
         raise px.SimulationError("MuJoCo warned")
 
-    monkeypatch.setattr(static_campaign, "simulate", simulate)
+    monkeypatch.setattr(static_campaign, "simulate_trial", simulate)
     answer = call(*ONE, "--out", "here")
     assert answer.code == 1
     assert answer.err.count(": failed: MuJoCo warned\n") == 4
@@ -238,8 +239,8 @@ def test_order_changes_no_number(call: Call, planned: Campaign, whole: Path) -> 
     shuffled = list(planned.trials)
     random.Random(1).shuffle(shuffled)
     there = json.loads((whole / "campaign.json").read_text())
-    with Pool(1) as pool, Store(Path("here"), there) as store:
-        run_campaign(replace(planned, trials=shuffled), store, pool)
+    with Pool(1) as pool, CampaignStore(Path("here"), there) as store:
+        perform_trials(replace(planned, trials=shuffled), store, pool)
     again = (*SMALL, "--workers", "1", "--keep", "worst:1", "--quiet", "--out", "here")
     assert call(*again).code == 0
     assert summary(Path("here")) == summary(whole)
@@ -285,8 +286,8 @@ def test_a_trial_that_kills_every_worker_of_a_cluster_stops_no_other(
     with dask.config.set({"distributed.scheduler.allowed-failures": 0}):
         address = cluster()
     campaign = replace(planned, perform=performs.dies_always, columns=["number"])
-    with Pool(1, address) as pool, Store(tmp_path / "store", {}) as store:
-        ended = run_campaign(campaign, store, pool)
+    with Pool(1, address) as pool, CampaignStore(tmp_path / "store", {}) as store:
+        ended = perform_trials(campaign, store, pool)
     assert [each.outcome.error for each in ended] == [
         None, "its worker process died, once (out of memory?)", *[None] * 6,
     ]  # fmt: skip
@@ -307,7 +308,7 @@ def test_a_cluster_without_workers_is_told_as_such(
 
 def test_a_half_written_trial_is_none(planned: Campaign, tmp_path: Path) -> None:
     key = planned.trials[0].key
-    with Store(tmp_path, {}) as store:
+    with CampaignStore(tmp_path, {}) as store:
         store.put(Outcome(key=key, row={"number": 1}))
         assert store.outcomes([key])[key].row == {"number": 1}
         file = tmp_path / "trials" / f"{key}.json"
@@ -403,7 +404,7 @@ def test_a_folder_of_another_build_is_refused(
 def test_a_folder_of_other_results_is_refused(tmp_path: Path) -> None:
     (tmp_path / "summary.json").write_text("{}")
     with pytest.raises(px.ConfigError, match="holds results of something else"):
-        Store(tmp_path, {})
+        CampaignStore(tmp_path, {})
     assert [path.name for path in tmp_path.iterdir()] == ["summary.json"]
 
 
@@ -427,16 +428,16 @@ def test_another_robot_under_the_same_name_is_refused(planned: Campaign) -> None
 
 def test_two_processes_do_not_work_in_one_folder(call: Call, whole: Path) -> None:
     description = json.loads((whole / "campaign.json").read_text())
-    with Store(whole, description):
+    with CampaignStore(whole, description):
         answer = call(*SMALL, "--quiet", "--out", whole)
     assert answer.code == 2
     assert "another process is at work on this campaign" in answer.err
 
 
 def test_a_store_that_is_closed_twice_closes_nothing_else(tmp_path: Path) -> None:
-    store = Store(tmp_path / "one", {})
+    store = CampaignStore(tmp_path / "one", {})
     store.close()
-    with Store(tmp_path / "other", {}):  # has the handle of the first
+    with CampaignStore(tmp_path / "other", {}):  # has the handle of the first
         store.close()
         with pytest.raises(px.ConfigError, match="another process is at work"):
-            Store(tmp_path / "other", {})
+            CampaignStore(tmp_path / "other", {})

@@ -16,9 +16,9 @@ from proxcgal.cli import main
 from proxcgal.recording.reader import read_recording
 from proxcgal.recording.replay import first_difference
 from proxcgal.scenario.loading import load_scenario
-from proxcgal.study.campaign_picture import show_moving
+from proxcgal.study.campaign_picture import draw_moving
 from proxcgal.study.workers import Pool
-from proxcgal.study.worst_recordings import keep_worst
+from proxcgal.study.worst_recordings import record_worst
 
 SMALL = ("--scenario", "front_plane", "--runs", "2", "--set", "duration=0.2", "--workers", "1")
 ONE = (*SMALL[:3], "1", *SMALL[4:])
@@ -105,7 +105,7 @@ def test_a_recording_that_fails_is_told_and_costs_no_result(
             raise px.SimulationError("disk full")
         return SimpleNamespace(recording_failure="disk full")
 
-    monkeypatch.setattr("proxcgal.study.trials.simulate", simulate)
+    monkeypatch.setattr("proxcgal.study.worst_recordings.simulate_trial", simulate)
     answer = call(*ONE, "--keep", "worst:1", "--out", "here")
     assert answer.code == 1
     assert answer.err == "proxcgal: front_plane-0-wb: not recorded: disk full\n"
@@ -123,7 +123,7 @@ def test_recordings_of_other_trials_go_half_ones_too(tmp_path: Path) -> None:
     for name in ("a.mcap", ".a.mcap"):
         (tmp_path / "recordings" / name).touch()
     with Pool(1) as pool:
-        assert keep_worst([], tmp_path, "scans", pool, quiet=True) == []
+        assert record_worst([], tmp_path, "scans", pool, quiet=True) == []
     assert list((tmp_path / "recordings").iterdir()) == []
 
 
@@ -149,5 +149,5 @@ def test_a_picture_that_was_on_its_way_when_its_process_was_killed_goes(tmp_path
     (tmp_path / ".drawing-x").mkdir()
     (tmp_path / ".drawing-x" / "0.mcap").touch()
     with Pool(1) as pool:
-        show_moving([], tmp_path, pool, quiet=True)
+        draw_moving([], tmp_path, pool, quiet=True)
     assert list(tmp_path.iterdir()) == []

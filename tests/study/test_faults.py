@@ -18,11 +18,11 @@ from proxcgal.scenario.loading import load_scenario
 from proxcgal.sim.faults import FaultInjector
 from proxcgal.sim.tick import TickInput
 from proxcgal.study.campaign import Trial
+from proxcgal.study.campaign_kind import CampaignRequest
 from proxcgal.study.faults.campaign import KIND, perform, plan
 from proxcgal.study.faults.cases import ROWS
-from proxcgal.study.faults.reliability_page import GOALS, page
+from proxcgal.study.faults.reliability_page import GOALS, reliability_page
 from proxcgal.study.faults.reliability_page import SHOWN as SHOWN_BY_TESTS
-from proxcgal.study.kind import CampaignRequest
 from proxcgal.trial.trial import run_trial
 
 SHOWN = (
@@ -82,7 +82,7 @@ def test_the_campaign_lists_wrong_rows_by_name() -> None:
             "worst_modes": {"HOLD": 2},
         }}},
     }  # fmt: skip
-    assert KIND.verdicts(summary) == [
+    assert list(KIND.verdicts(summary)) == [
         "The behaviour was right in 1 of 2 runs.",
         "Not always right: all silent on ur10e (1 of 2).",
     ]
@@ -182,9 +182,9 @@ def test_every_test_that_the_page_names_exists() -> None:
 
 def test_a_page_of_few_runs_claims_no_goal_and_has_no_link_that_leads_nowhere() -> None:
     summary = {"robots": {}, "right": 0, "runs": 1}
-    assert "## Goals" not in page(ROWS, summary, {})
-    assert "## Goals" in page(ROWS, summary | {"runs": 200}, {})
-    assert "](" not in page(ROWS, summary | {"runs": 200}, {})
+    assert "## Goals" not in reliability_page(ROWS, summary, {})
+    assert "## Goals" in reliability_page(ROWS, summary | {"runs": 200}, {})
+    assert "](" not in reliability_page(ROWS, summary | {"runs": 200}, {})
 
 
 def test_a_scenario_of_another_kind_is_refused_by_its_kind() -> None:

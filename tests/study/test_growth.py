@@ -8,13 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from proxcgal.study.timing.grid import Cell, formula, growth
+from proxcgal.study.timing.grid import TimingCell, formula, growth
 from proxcgal.study.timing.growth import fit_growth, student_quantile
 
 
-def made_cells(time: Callable[[float, float], float]) -> list[Cell]:
+def made_cells(time: Callable[[float, float], float]) -> list[TimingCell]:
     return [
-        Cell(
+        TimingCell(
             robot="r", vertices=vertices, cloud=cloud, points=points, algorithm=2, method="fast",
             samples_us=np.array([time(vertices, points)]),
         )

@@ -16,13 +16,15 @@ from proxcgal.scene.human.motion import move
 from proxcgal.scene.human.recorded import write_motion
 from proxcgal.scene.human.subject import draw_subject
 from proxcgal.sim.waypoints import Waypoints
+from proxcgal.study.campaign_kind import CampaignRequest
 from proxcgal.study.hri import campaign as hri_campaign
 from proxcgal.study.hri.figures import figures
 from proxcgal.study.hri.layouts import JITTER_M, draw_layout
-from proxcgal.study.hri.metrics import PAPER, analyse, held
-from proxcgal.study.hri.texts import captions, introduction, listings, verdicts
-from proxcgal.study.kind import CampaignRequest
-from proxcgal.study.trials import robot_of
+from proxcgal.study.hri.metrics import PAPER_MEANS, analyse, held
+from proxcgal.study.hri.paper_tables import listings
+from proxcgal.study.hri.texts import captions, introduction, verdicts
+from proxcgal.study.hri.trial_metrics import COLUMNS, trial_metrics
+from proxcgal.study.trial_simulation import robot_of
 from proxcgal.trial.trial import run_trial
 
 #: The study in short: half a second, the first signal alone.
@@ -195,7 +197,7 @@ def test_every_row_has_its_sentence_with_a_bound_or_without(campaign: Any) -> No
     told = [text for text in verdicts(summary) if text.startswith("main: ")]
     assert any("Assembly Task 2, mean true distance: wb is farther off" in text for text in told)
     assert any("Task 2, least true distance: wb is farther off" in text for text in told)
-    few = verdicts(analyse(table_of(MEANS), campaign))
+    few = list(verdicts(analyse(table_of(MEANS), campaign)))
     assert any("3 pairs, too few to tell wb and sm apart" in text for text in few)
 
 
@@ -290,7 +292,10 @@ def test_a_recorded_person_is_told_and_no_subject(call: Callable[..., Any], tmp_
 
 def test_the_papers_figures_stand_beside_ours(campaign: Any) -> None:
     text = "\n".join(map(str, listings(analyse(table_of(MEANS), campaign))))
-    for row, cell in (("Assembly Task 2", PAPER["task2"]), ("first run", PAPER["H3_first"])):
+    for row, cell in (
+        ("Assembly Task 2", PAPER_MEANS["task2"]),
+        ("first run", PAPER_MEANS["H3_first"]),
+    ):
         lines = [line for line in text.splitlines() if row in line]
         assert any(f"{cell['wb'][0]:.3f}" in line for line in lines)
     assert "d_min [m]" in text
@@ -322,10 +327,10 @@ def test_a_trial_beside_a_person_keeps_the_robots_limits() -> None:
     scenario = load_scenario("hri_task1", ("operator.subject=2", *SHORT))
     assert isinstance(scenario, HriScenario)
     log = run_trial(scenario, "wb", sparse_truth=True, truth_hz=15.0)
-    numbers = hri_campaign.numbers(log, scenario)
+    numbers = trial_metrics(log, scenario)
     assert numbers["finite"]
     assert numbers["limits_kept"]
-    assert set(numbers) == set(hri_campaign.COLUMNS)
+    assert set(numbers) == set(COLUMNS)
     every = run_trial(scenario, "wb")
     samples = sampled_ticks(every.elapsed, 15.0)
     np.testing.assert_allclose(log.true_m[samples], every.true_m[samples], atol=1e-9)

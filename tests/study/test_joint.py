@@ -9,9 +9,9 @@ import pytest
 
 from proxcgal.core.errors import ConfigError
 from proxcgal.scenario.loading import CONTROLLERS
+from proxcgal.study.campaign_kind import CampaignRequest
 from proxcgal.study.joint.campaign import KIND, PERCEPTIONS, SCENES, STACKS
 from proxcgal.study.joint.texts import listings, verdicts
-from proxcgal.study.kind import CampaignRequest
 
 KEYS = {
     "scenario", "init", "tasks", "succeeded", "time_s", "position_error_m", "angle_error_rad",

@@ -98,7 +98,8 @@ def test_the_share_closed_and_its_interval_are_those_of_scipy() -> None:
 def told_of(cases: list[tuple[float, float]]) -> str:
     """Of draws with these ends of wb and wb_memory; wb_known ends at 0.25 m."""
     rows = [row for n, case in enumerate(cases) for row in draw(n, *case, "in_view")]
-    return memory_sentences("side", memory_summary(pl.DataFrame(rows, infer_schema_length=None)))[0]
+    table = pl.DataFrame(rows, infer_schema_length=None)
+    return next(memory_sentences("side", memory_summary(table)))
 
 
 def test_few_draws_are_said_to_be_few() -> None:

@@ -16,9 +16,9 @@ import proxcgal as px
 from proxcgal.cli import main
 from proxcgal.scenario.loading import load_scenario
 from proxcgal.study.timing import grid as timing_grid
-from proxcgal.study.timing.grid import Cell, Effort, measure, sweep_summary, time_cells
+from proxcgal.study.timing.comparison import compare, cycle_verdict, sweep_table
+from proxcgal.study.timing.grid import Effort, TimingCell, measure, sweep_summary, time_cells
 from proxcgal.study.timing.inputs import Inputs, grid_inputs
-from proxcgal.study.timing.ratios import compare, cycle_verdict, sweep_table
 
 EFFORT = Effort(seconds=0.0, rounds=3, most=3)
 CELL_KEYS = [
@@ -32,7 +32,7 @@ def grid(arm_cell: Path) -> list[Inputs]:
 
 
 @pytest.fixture(scope="module")
-def cells(grid: list[Inputs]) -> list[Cell]:
+def cells(grid: list[Inputs]) -> list[TimingCell]:
     return list(time_cells(grid, EFFORT))
 
 
@@ -62,7 +62,9 @@ def test_a_slow_call_is_still_timed_in_every_round() -> None:
     assert len(samples) == 5
 
 
-def test_a_grid_has_both_algorithms_by_both_methods(grid: list[Inputs], cells: list[Cell]) -> None:
+def test_a_grid_has_both_algorithms_by_both_methods(
+    grid: list[Inputs], cells: list[TimingCell]
+) -> None:
     assert len(cells) == 4 * len(grid)
     assert {(c.algorithm, c.method) for c in cells} == {
         (1, "paper"), (1, "fast"), (2, "paper"), (2, "fast"),
@@ -90,7 +92,7 @@ def test_methods_that_disagree_are_not_timed(
 # --- Numbers
 
 
-def test_the_summary_has_the_keys_that_were_promised(cells: list[Cell]) -> None:
+def test_the_summary_has_the_keys_that_were_promised(cells: list[TimingCell]) -> None:
     summary = sweep_summary(cells, "a machine")
     assert list(summary) == ["machine", "cells", "growth"]
     for cell in summary["cells"]:

@@ -11,8 +11,8 @@ import viser.transforms
 from browser import Tab, pixel, until
 
 from proxcgal.scenario.loading import load_scenario
-from proxcgal.viewer.access import close, serve
 from proxcgal.viewer.live_page import LivePage
+from proxcgal.viewer.page_server import close, serve
 from proxcgal.viewer.panel import HANDLE
 
 
@@ -22,10 +22,10 @@ class Live:
     def __init__(self, name: str, folder: Path, open_tab: Callable[[], Tab], ready: str) -> None:
         self.folder = folder
         self.scenario = load_scenario(name)
-        self.server, self.gate = serve("127.0.0.1", 0, label=f"proxcgal: {name}")
-        self.page = LivePage(self.server, self.gate, self.scenario, "wb")
+        self.server, self.access = serve("127.0.0.1", 0, label=f"proxcgal: {name}")
+        self.page = LivePage(self.server, self.access, self.scenario, "wb")
         self.address = f"http://127.0.0.1:{self.server.get_port()}/"
-        assert until(lambda: self.page.told.moment is not None)
+        assert until(lambda: self.page.last.moment is not None)
         self.open_tab = open_tab
         self.tab = open_tab()
         self.tab.open(self.address)
@@ -34,13 +34,13 @@ class Live:
 
     @property
     def moment(self) -> Any:
-        assert self.page.told.moment is not None
-        return self.page.told.moment
+        assert self.page.last.moment is not None
+        return self.page.last.moment
 
     @property
     def activation(self) -> tuple[Any, Any]:
         """The curve that the page draws: times [s] and values."""
-        time, activation = self.page._controls.plots._activation.data
+        time, activation = self.page._panel.plots._activation.data
         return np.asarray(time), np.asarray(activation)
 
     @property
@@ -61,7 +61,7 @@ class Live:
         The button stays down. A page that draws slowly may not know yet that the mouse is there:
         then it is tried again.
         """
-        handle = self.server.scene._handle_from_transform_controls_name[HANDLE]
+        handle = self.server.scene._handle_from_transform_panel_name[HANDLE]
         mouse = self.tab.page.mouse
         for _ in range(4):
             R_WH = viser.transforms.SO3(np.asarray(handle.wxyz)).as_matrix()

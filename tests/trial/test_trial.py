@@ -27,8 +27,8 @@ from proxcgal.sim.faults import FaultInjector
 from proxcgal.sim.range_sensor import NO_TARGET, VALID
 from proxcgal.sim.tick import TickInput
 from proxcgal.study.campaign_picture import _draw
-from proxcgal.study.runs.results import warn_of_stopped
-from proxcgal.study.trials import simulate
+from proxcgal.study.runs.simulation import warn_of_stopped
+from proxcgal.study.trial_simulation import simulate_trial
 from proxcgal.trial.trial import TrialLog, first_difference, recompute, run_trial
 
 SHORT = ["duration=1.0"]
@@ -204,7 +204,7 @@ def test_a_recording_that_could_not_be_closed_is_told_too(
 
     monkeypatch.setattr(Writer, "finish", full)
     scenario = load_scenario("front_plane", ["duration=0.05"])
-    told = functools.partial(simulate, scenario, "wb", 0, lambda _: None)
+    told = functools.partial(simulate_trial, scenario, "wb", 0, lambda _: None)
     assert "No space left" in (told(recording=tmp_path / "a.mcap").recording_failure or "")
     trial = SimpleNamespace(scenario=scenario, controller="wb", seed=0)
     assert "No space left" in _draw([trial], tmp_path, lambda _: None)  # type: ignore[list-item]

@@ -24,11 +24,11 @@ from proxcgal.models.builtin import ga_ol
 from proxcgal.scenario.loading import load_scenario, parse_scenario
 from proxcgal.scenario.walkthrough import GuidedScenario, Leg, WalkScenario
 from proxcgal.sim.physics import Physics
-from proxcgal.study.figures import GREY
-from proxcgal.study.runs.walkthrough import lines_of
-from proxcgal.study.walkthrough.campaign import figures
+from proxcgal.study.plotting import GREY
+from proxcgal.study.runs.walkthrough import walkthrough_lines
 from proxcgal.study.walkthrough.figures import trip_figure
 from proxcgal.study.walkthrough.ratings import read_ratings
+from proxcgal.study.walkthrough.stops_figure import figures
 from proxcgal.trial.trial import run_trial
 from proxcgal.trial.walkthrough import playback
 from proxcgal.trial.walkthrough.guided import off_path
@@ -155,7 +155,7 @@ def test_a_playback_that_trips_on_its_way_to_the_start_tells_what_tripped(
     played = play(short, path, q)
     assert played.log.trips[0].function in {"joint_speed", "joint_acceleration"}
     assert not played.log.torque[-1]
-    told = lines_of(WalkResult(teach(short, seed=0), path, played).summary())
+    told = walkthrough_lines(WalkResult(teach(short, seed=0), path, played).summary())
     assert any("played back up to" in line and "joint_" in line for line in told)
 
 
@@ -480,7 +480,7 @@ def test_a_hand_too_weak_for_its_path_is_told(taught: WalkLog) -> None:
     assert weak.left_m is not None
     assert weak.left_m > REACHED
     summary = WalkResult(weak).summary()
-    assert f"let go {weak.left_m:.3f} m from the path's end" in lines_of(summary)[-1]
+    assert f"let go {weak.left_m:.3f} m from the path's end" in walkthrough_lines(summary)[-1]
 
 
 def test_the_figure_of_a_trip_shows_the_quantity_that_tripped() -> None:

@@ -1,4 +1,4 @@
-"""The page's gate, against real and hostile clients of a real server."""
+"""The page's access, against real and hostile clients of a real server."""
 
 import socket
 import time as clock
@@ -17,11 +17,10 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 import proxcgal as px
-from proxcgal.cli import view
-from proxcgal.cli.view import address, checked_token
-from proxcgal.study.runs import results
-from proxcgal.viewer.access import Gate, close, serve
-from proxcgal.viewer.client_messages import Bounds, between, one_of, switch
+from proxcgal.viewer import live_view
+from proxcgal.viewer.access import AccessControl
+from proxcgal.viewer.client_messages import ClientBounds, between, one_of, switch
+from proxcgal.viewer.page_server import checked_token, close, page_address, serve
 
 SPOKEN = f"viser-v{viser.__version__}"
 TOKEN = "correct-horse-battery"
@@ -36,9 +35,9 @@ class Served:
     """A server with one slider, and ways to reach it."""
 
     def __init__(self, **options: Any) -> None:
-        self.server, self.gate = serve("127.0.0.1", 0, label="test", **options)
+        self.server, self.access = serve("127.0.0.1", 0, label="test", **options)
         self.slider = self.server.gui.add_slider("d_min", 0.05, 0.5, 0.01, 0.2)
-        self.gate.offer(self.slider, between(0.05, 0.5))
+        self.access.allow_control(self.slider, between(0.05, 0.5))
         self.other = self.server.gui.add_slider("not offered", 0.0, 1.0, 0.1, 0.5)
         self.port = self.server.get_port()
 
@@ -100,7 +99,7 @@ def test_a_page_on_this_machine_is_served_and_its_slider_heard(open_page: Served
         say(connection, open_page.set_slider(0.3))
         assert until(lambda: open_page.slider.value == 0.3)
         assert until(lambda: len(open_page.server.get_clients()) == 1)
-    assert until(lambda: open_page.gate.viewers == 0)
+    assert until(lambda: open_page.access.viewers == 0)
     assert open_page.server.get_clients() == {}
 
 
@@ -112,8 +111,8 @@ def test_without_the_token_neither_page_nor_connection_is_given(guarded: Served)
             guarded.connect(path)
     with pytest.raises(InvalidStatus, match="403"):
         guarded.connect(additional_headers={"Cookie": f"proxcgal_{guarded.port}=wrong"})
-    assert guarded.gate.refused == 9
-    assert guarded.gate.viewers == 0
+    assert guarded.access.refused == 9
+    assert guarded.access.viewers == 0
 
 
 def test_with_the_token_the_page_gets_a_cookie_and_that_opens_the_connection(
@@ -160,18 +159,20 @@ def test_pages_of_other_sites_are_refused(open_page: Served, headers: dict[str, 
     ],
 )  # fmt: skip
 def test_a_message_that_no_page_needs_is_dropped(message: object) -> None:
-    assert not Gate("127.0.0.1").accepts(msgspec.msgpack.encode(message))
+    assert not AccessControl("127.0.0.1").accepts(msgspec.msgpack.encode(message))
 
 
 def test_a_value_outside_of_its_control_is_dropped(open_page: Served) -> None:
-    gate, told = open_page.gate, open_page.set_slider
-    assert gate.accepts(msgspec.msgpack.encode(told(0.4)))
+    access, setting = open_page.access, open_page.set_slider
+    assert access.accepts(msgspec.msgpack.encode(setting(0.4)))
     for value in (0.0, 0.6, -1, 1e9, float("nan"), float("inf"), "0.3", True, None, [0.3]):
-        assert not gate.accepts(msgspec.msgpack.encode(told(value)))
-    assert not gate.accepts(msgspec.msgpack.encode(told(0.4, open_page.other)))
-    wider = told(0.4) | {"updates": {"value": 0.4, "max": 9.0}}
-    assert not gate.accepts(msgspec.msgpack.encode(wider))
-    assert not gate.accepts(msgspec.msgpack.encode(told(0.4) | {"updates": {"visible": False}}))
+        assert not access.accepts(msgspec.msgpack.encode(setting(value)))
+    assert not access.accepts(msgspec.msgpack.encode(setting(0.4, open_page.other)))
+    wider = setting(0.4) | {"updates": {"value": 0.4, "max": 9.0}}
+    assert not access.accepts(msgspec.msgpack.encode(wider))
+    assert not access.accepts(
+        msgspec.msgpack.encode(setting(0.4) | {"updates": {"visible": False}})
+    )
 
 
 def test_lists_and_switches_take_what_they_offer() -> None:
@@ -184,12 +185,12 @@ def test_lists_and_switches_take_what_they_offer() -> None:
 
 @given(st.binary(max_size=300))
 def test_no_bytes_break_the_gate(raw: bytes) -> None:
-    Gate("127.0.0.1").accepts(raw)
-    Gate("127.0.0.1").accepts(b"\xdc" * 3 + raw)
+    AccessControl("127.0.0.1").accepts(raw)
+    AccessControl("127.0.0.1").accepts(b"\xdc" * 3 + raw)
 
 
 def test_messages_deeply_nested_are_dropped() -> None:
-    assert not Gate("127.0.0.1").accepts(b"\x91" * 10_000 + b"\x00")
+    assert not AccessControl("127.0.0.1").accepts(b"\x91" * 10_000 + b"\x00")
 
 
 def test_a_message_too_large_ends_its_connection_and_no_other(open_page: Served) -> None:
@@ -209,7 +210,7 @@ def test_a_flood_ends_its_connection_and_no_other(open_page: Served) -> None:
             flood(bad)
         say(good, open_page.set_slider(0.25))
         assert until(lambda: open_page.slider.value == 0.25)
-    assert until(lambda: open_page.gate.viewers == 0)
+    assert until(lambda: open_page.access.viewers == 0)
 
 
 def test_rubbish_is_dropped_without_ending_the_connection(open_page: Served) -> None:
@@ -219,20 +220,20 @@ def test_rubbish_is_dropped_without_ending_the_connection(open_page: Served) -> 
         say(connection, CAMERA)
         say(connection, open_page.set_slider(0.15))
         assert until(lambda: open_page.slider.value == 0.15)
-    assert open_page.gate.dropped == 4
+    assert open_page.access.dropped == 4
 
 
 def test_more_pages_than_allowed_are_told_so_and_one_that_leaves_makes_room() -> None:
-    served = Served(bounds=Bounds(viewers=2))
+    served = Served(bounds=ClientBounds(viewers=2))
     try:
         with served.connect() as first, served.connect():
-            assert until(lambda: served.gate.viewers == 2)
+            assert until(lambda: served.access.viewers == 2)
             with pytest.raises(InvalidStatus, match="503"):
                 served.connect()
             first.close()
-            assert until(lambda: served.gate.viewers == 1)
+            assert until(lambda: served.access.viewers == 1)
             with served.connect():
-                assert until(lambda: served.gate.viewers == 2)
+                assert until(lambda: served.access.viewers == 2)
     finally:
         close(served.server)
 
@@ -244,7 +245,7 @@ def test_a_viewer_that_vanishes_leaves_nothing_behind(open_page: Served) -> None
     assert until(lambda: len(open_page.server.get_clients()) == 3)
     for connection in connections:
         connection.socket.shutdown(socket.SHUT_RDWR)  # no goodbye
-    assert until(lambda: open_page.gate.viewers == 0)
+    assert until(lambda: open_page.access.viewers == 0)
     assert open_page.server.get_clients() == {}
     assert open_page.server._websock_server._client_state_from_id == {}
     assert open_page.server._websock_server._broadcast_buffer.generator_cursors == {}
@@ -271,7 +272,7 @@ def test_beyond_this_machine_there_is_a_warning_and_always_a_token() -> None:
     assert len(drawn) >= 16
     with pytest.warns(UserWarning, match="not encrypted"):
         assert checked_token("0.0.0.0", 0, TOKEN) == TOKEN
-    assert address("0.0.0.0", 8080, TOKEN) == f"http://127.0.0.1:8080/?token={TOKEN}"
+    assert page_address("0.0.0.0", 8080, TOKEN) == f"http://127.0.0.1:8080/?token={TOKEN}"
 
 
 @pytest.mark.parametrize("token", ["", "short", "with space 123", "käse12345678", "a" * 8 + ";"])
@@ -308,8 +309,8 @@ def test_the_address_is_told_once_there_is_something_to_see(
         handles = page._server.scene._handle_from_node_name
         seen.extend(name for name in handles if name.startswith("/arm/"))
 
-    monkeypatch.setattr(view, "_attend", attend)
-    monkeypatch.setattr(view.os, "nice", lambda _: 0)  # of this process: for good
+    monkeypatch.setattr(live_view, "_attend", attend)
+    monkeypatch.setattr(live_view.os, "nice", lambda _: 0)  # of this process: for good
     answer = call("view", arm_cell, "--port", "0")
     assert answer.code == 0
     assert answer.out.startswith("http://127.0.0.1:")
@@ -319,8 +320,8 @@ def test_the_address_is_told_once_there_is_something_to_see(
 def test_a_simulation_that_cannot_begin_is_told_without_an_address(
     call: Callable[..., Any], arm_cell: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(view.os, "nice", lambda _: 0)
-    monkeypatch.setattr(results, "check", lambda *_, **__: None)  # else it is told before
+    monkeypatch.setattr(live_view.os, "nice", lambda _: 0)
+    monkeypatch.setattr(live_view, "check_setup", lambda *_, **__: None)  # else it fails before
     answer = call("view", arm_cell, "--port", "0", "--set", "q0=[9.0, 0.0]")
     assert answer.code == 2
     assert answer.out == ""

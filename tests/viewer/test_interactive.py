@@ -1,4 +1,4 @@
-"""The live trial behind the page: hands, silent sensors, what a page may choose, how it is told."""
+"""The live trial behind the page: hands, silent sensors, what a page may choose, its updates."""
 
 import multiprocessing
 import re
@@ -29,7 +29,7 @@ from proxcgal.viewer.choice import Choice, robots
 from proxcgal.viewer.command_queue import ROOM, CommandQueue
 from proxcgal.viewer.messages import Request, Update
 from proxcgal.viewer.preparation import Preparation
-from proxcgal.viewer.simulation import simulate
+from proxcgal.viewer.simulation import run_simulation
 
 RNG = np.random.default_rng(1)
 
@@ -128,35 +128,37 @@ def test_an_arm_whose_joint_state_is_no_number_is_drawn_where_it_is(front: Scena
 def test_nothing_that_a_page_says_leads_out_of_a_stop(cell: Scenario) -> None:
     old_joints = Fault.model_validate({"kind": "joints_old", "value": 1.0, "from": 0.5, "to": 0.6})
     with started(cell.model_copy(update={"faults": (old_joints,)})) as link:
-        listen(link, lambda told: told.moment and told.moment.mode == STOP)
+        listen(link, lambda update: update.moment and update.moment.mode == STOP)
         choice = Choice.of(cell, "wb")
         link.send(Request(reset=True))
-        link.send(Request(choice=replace(choice, controller="sm"), release=True, off=frozenset()))
+        link.send(
+            Request(choice=replace(choice, controller="sm"), release=True, silent=frozenset())
+        )
         link.send(Request(running=False, steps=3))
-        told = listen(link, lambda told: not told.running and told.moment)
-        assert told.moment.mode == STOP
-        assert told.moment.elapsed >= 0.5
-        link.send(Request(anew=True, running=True))  # whoever started the command
-        anew = listen(link, lambda told: told.moment and told.moment.mode < STOP)
-        assert anew.moment.elapsed < 0.5
+        update = listen(link, lambda update: not update.running and update.moment)
+        assert update.moment.mode == STOP
+        assert update.moment.elapsed >= 0.5
+        link.send(Request(restart=True, running=True))  # as the terminal does
+        restarted = listen(link, lambda update: update.moment and update.moment.mode < STOP)
+        assert restarted.moment.elapsed < 0.5
 
 
 def test_a_page_that_takes_nothing_does_not_slow_the_simulation(cell: Scenario) -> None:
     with started(cell) as link:
-        listen(link, lambda told: told.model)
-        first = listen(link, lambda told: told.moment)
+        listen(link, lambda update: update.model)
+        first = listen(link, lambda update: update.moment)
 
-        def passed(told: Update) -> bool:
+        def passed(update: Update) -> bool:
             clock.sleep(1.0)  # moments that are not fetched
-            return told.dropped >= 5 and told.moment.elapsed > first.moment.elapsed + 0.5
+            return update.dropped >= 5 and update.moment.elapsed > first.moment.elapsed + 0.5
 
-        later = listen(link, lambda told: told.moment and passed(told))
+        later = listen(link, lambda update: update.moment and passed(update))
         assert later.moment.elapsed > first.moment.elapsed + 0.5
 
 
 def test_the_simulation_ends_with_its_page(cell: Scenario) -> None:
     with started(cell) as link:
-        listen(link, lambda told: told.moment)
+        listen(link, lambda update: update.moment)
         link.close()
     assert multiprocessing.active_children() == []
 
@@ -164,13 +166,15 @@ def test_the_simulation_ends_with_its_page(cell: Scenario) -> None:
 def test_pause_step_and_reset(cell: Scenario) -> None:
     with started(cell) as link:
         link.send(Request(running=False))
-        paused = listen(link, lambda told: told.moment and not told.running).moment
+        paused = listen(link, lambda update: update.moment and not update.running).moment
         link.send(Request(steps=7))
-        stepped = listen(link, lambda told: told.moment and told.moment.elapsed > paused.elapsed)
+        stepped = listen(
+            link, lambda update: update.moment and update.moment.elapsed > paused.elapsed
+        )
         assert stepped.moment is not None
         assert stepped.moment.elapsed == pytest.approx(paused.elapsed + 0.07)
         link.send(Request(reset=True))
-        again = listen(link, lambda told: told.moment and told.moment.elapsed < 0.07)
+        again = listen(link, lambda update: update.moment and update.moment.elapsed < 0.07)
         assert np.array_equal(again.moment.q, cell.q0)
 
 
@@ -178,14 +182,14 @@ def test_another_choice_goes_on_where_the_arm_is_and_one_that_does_not_fit_chang
     front: Scenario,
 ) -> None:
     with started(front) as link:
-        before = listen(link, lambda told: told.moment and told.moment.elapsed > 0.5).moment
+        before = listen(link, lambda update: update.moment and update.moment.elapsed > 0.5).moment
         choice = replace(Choice.of(front, "wb"), d_min=0.3, controller="sm")
         link.send(Request(choice=choice))
-        stage = listen(link, lambda told: told.model)
-        after = listen(link, lambda told: told.moment).moment
+        stage = listen(link, lambda update: update.model)
+        after = listen(link, lambda update: update.moment).moment
         link.send(Request(choice=replace(choice, d_min=9.0)))
-        note = listen(link, lambda told: told.note).note
-        back = listen(link, lambda told: told.refused)
+        note = listen(link, lambda update: update.note).note
+        back = listen(link, lambda update: update.refused)
     assert "d_min = 9: from 0.05 to 0.5" in note
     assert back.choice == choice
     assert stage.choice == choice
@@ -198,10 +202,10 @@ def test_another_choice_goes_on_where_the_arm_is_and_one_that_does_not_fit_chang
 @pytest.mark.long
 def test_another_robot_starts_with_its_own_sensors(front: Scenario) -> None:
     with started(front) as link:
-        listen(link, lambda told: told.moment)
+        listen(link, lambda update: update.moment)
         link.send(Request(choice=replace(Choice.of(front, "wb"), robot="panda")))
-        stage = listen(link, lambda told: told.model).model
-        moment = listen(link, lambda told: told.moment and len(told.moment.q) == 7).moment
+        stage = listen(link, lambda update: update.model).model
+        moment = listen(link, lambda update: update.moment and len(update.moment.q) == 7).moment
     assert (stage.robot, len(stage.sensors)) == ("panda", 30)
     assert len(moment.links_W) == len(stage.links)
 
@@ -257,20 +261,20 @@ def test_what_the_page_does_not_offer_cannot_be_chosen(
 
 
 def test_the_last_wish_counts_and_the_room_has_walls() -> None:
-    desk = CommandQueue()
-    assert desk.take() is None
-    desk.want(running=True)
-    desk.want(running=False, steps=1)
-    desk.want(steps=2)
-    desk.move("panel", pose((1.0, 0.0, 0.0)))
-    desk.move("panel", pose((1e9, 0.0, -1e9)))
-    wishes = desk.take()
-    assert wishes is not None
-    assert (wishes.running, wishes.steps) == (False, 3)
-    ((name, T_WO),) = wishes.hands
+    queue = CommandQueue()
+    assert queue.take() is None
+    queue.put(running=True)
+    queue.put(running=False, steps=1)
+    queue.put(steps=2)
+    queue.move("panel", pose((1.0, 0.0, 0.0)))
+    queue.move("panel", pose((1e9, 0.0, -1e9)))
+    request = queue.take()
+    assert request is not None
+    assert (request.running, request.steps) == (False, 3)
+    ((name, T_WO),) = request.moves
     assert name == "panel"
     assert T_WO[:3, 3].tolist() == [ROOM[1, 0], 0.0, ROOM[0, 2]]
-    assert desk.take() is None
+    assert queue.take() is None
 
 
 @given(st.integers(0, 40), st.integers(0, 40))
@@ -295,7 +299,9 @@ def started(scenario: Scenario, controller: str = "wb") -> Iterator[Connection]:
     """A simulation in its process: the link to it."""
     context = multiprocessing.get_context("spawn")
     link, theirs = context.Pipe()
-    process = context.Process(target=simulate, args=(theirs, scenario, controller), daemon=True)
+    process = context.Process(
+        target=run_simulation, args=(theirs, scenario, controller), daemon=True
+    )
     process.start()
     theirs.close()
     try:
@@ -307,14 +313,14 @@ def started(scenario: Scenario, controller: str = "wb") -> Iterator[Connection]:
 
 
 def listen(link: Connection, until: Callable[[Update], Any], seconds: float = 120.0) -> Any:
-    """Takes what is told until that is true of it."""
+    """Takes updates until that is true of one."""
     end = clock.monotonic() + seconds
     while clock.monotonic() < end:
         if link.poll(0.1):
-            told: Update = link.recv()
-            assert not told.failed, told.failed
-            if told.moment is not None:
+            update: Update = link.recv()
+            assert not update.failed, update.failed
+            if update.moment is not None:
                 link.send(None)
-            if until(told):
-                return told
-    raise AssertionError("nothing of the kind was told in time")
+            if until(update):
+                return update
+    raise AssertionError("no such update came in time")

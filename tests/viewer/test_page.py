@@ -8,7 +8,7 @@ import pytest
 from browser import Tab, until
 from live import Live
 
-from proxcgal.viewer.access import close, serve
+from proxcgal.viewer.page_server import close, serve
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +26,7 @@ def test_the_page_asks_no_other_host_for_anything(live: Live) -> None:
     hosts = {urlsplit(url.removeprefix("blob:")).netloc for url in live.tab.requests}
     assert hosts == {urlsplit(live.address).netloc}
     assert live.tab.errors == []
-    assert live.gate.dropped == 0  # the gate knows all that a real page sends
+    assert live.access.dropped == 0  # the gate knows all that a real page sends
     live.tab.picture("page", live.folder)
 
 
@@ -59,7 +59,7 @@ def test_a_sensor_that_is_switched_off_leaves_the_cloud(live: Live) -> None:
     page.get_by_text("sensors", exact=True).click()
     for row in (1, 2, 3):
         page.get_by_label(f"forearm_link/ring2/{row}", exact=True).click()
-    assert until(lambda: live.page._controls.off == {21, 22, 23})
+    assert until(lambda: live.page._panel.silent == {21, 22, 23})
 
     def held() -> bool:
         """What they saw last stays; the simulation hears of the last of them a little later."""
@@ -75,7 +75,7 @@ def test_a_sensor_that_is_switched_off_leaves_the_cloud(live: Live) -> None:
 
 def test_a_slider_changes_the_law_and_the_arm_goes_on_where_it_is(live: Live) -> None:
     live.press("pause")
-    assert until(lambda: not live.page.told.running)
+    assert until(lambda: not live.page.last.running)
     q = live.moment.q
     slider = live.tab.page.get_by_role("slider").first
     slider.focus()
@@ -87,12 +87,12 @@ def test_a_slider_changes_the_law_and_the_arm_goes_on_where_it_is(live: Live) ->
     assert until(lambda: live.page.drawn > drawn + 1)  # of the new law
     assert np.abs(live.moment.q - q).max() < 0.01
     live.press("run")
-    assert until(lambda: live.page.told.running)
+    assert until(lambda: live.page.last.running)
 
 
 def test_reset_and_pause_are_heard(live: Live) -> None:
     live.press("pause")
-    assert until(lambda: not live.page.told.running)
+    assert until(lambda: not live.page.last.running)
     live.press("reset")
     assert until(lambda: live.moment.elapsed < 1.0)
     assert np.allclose(live.moment.q, live.scenario.q0)
@@ -103,27 +103,27 @@ def test_reset_and_pause_are_heard(live: Live) -> None:
 def test_a_second_viewer_sees_the_same_and_leaves_nothing_behind(live: Live) -> None:
     tab = live.open_tab()
     tab.open(live.address)
-    assert until(lambda: live.gate.viewers == 2)
+    assert until(lambda: live.access.viewers == 2)
     tab.page.get_by_text("paused").wait_for()
     assert tab.errors == []
     tab.page.close()
-    assert until(lambda: live.gate.viewers == 1)
+    assert until(lambda: live.access.viewers == 1)
     assert len(live.server.get_clients()) == 1
 
 
 def test_a_browser_needs_the_token_and_keeps_it(open_tab: Callable[[], Tab]) -> None:
     token = "correct-horse-battery"
-    server, gate = serve("127.0.0.1", 0, label="guarded", token=token)
+    server, access = serve("127.0.0.1", 0, label="guarded", token=token)
     server.gui.add_markdown("inside")
     address = f"http://127.0.0.1:{server.get_port()}/"
     try:
         tab = open_tab()
         tab.open(address)
         assert "a token is needed" in tab.page.content()
-        assert gate.viewers == 0
+        assert access.viewers == 0
         tab.open(f"{address}?token={token}")
         tab.page.get_by_text("inside").wait_for()
-        assert gate.viewers == 1
+        assert access.viewers == 1
         tab.page.close()
     finally:
         close(server)

@@ -22,7 +22,7 @@ def opened(
         yield live
         live.tab.picture(name, folder)
         assert live.tab.errors == []
-        assert live.gate.dropped == 0
+        assert live.access.dropped == 0
     finally:
         live.close()
 
@@ -67,19 +67,19 @@ def test_a_person_s_hand_that_is_dragged_is_what_true_distances_run_to(
     with opened("hri_task1", tmp_path, open_tab) as live:
         stage = live.page._drawing.model  # type: ignore[union-attr]
         door = stage.names.index("door")
-        assert "door" not in stage.grips
+        assert "door" not in stage.draggable
         assert live.moment.solids_W.shape == (len(stage.names), 4, 4)
         assert np.allclose(live.moment.solids_W[door][:3, 3], [1.21, 0.0, 0.15])
-        hand = stage.names.index(live.page._controls._which.value)
+        hand = stage.names.index(live.page._panel._which.value)
         live.press("pause")
-        assert until(lambda: not live.page.told.running)
+        assert until(lambda: not live.page.last.running)
         before = live.moment.solids_W[hand][:3, 3].copy()
         live.drag((0.0, 0.0, 0.2))
         live.tab.page.mouse.up()
         live.press("run")
         assert until(lambda: live.moment.solids_W[hand][2, 3] > before[2] + 0.05)
         live.press("pause")
-        assert until(lambda: not live.page.told.running)
+        assert until(lambda: not live.page.last.running)
         setup, moment = Setup.of(live.scenario), live.moment
         rows = [stage.names.index(name) for name in setup.measured.names]
         shown = Posed(setup.measured, moment.solids_W[rows])
@@ -90,7 +90,7 @@ def test_an_obstacle_that_is_dragged_before_the_joint_robot_is_known_there(
     open_tab: Callable[[], Tab], tmp_path: Path
 ) -> None:
     with opened("joint_gate", tmp_path, open_tab) as live:
-        row = live.page._drawing.model.names.index(live.page._controls._which.value)  # type: ignore[union-attr]
+        row = live.page._drawing.model.names.index(live.page._panel._which.value)  # type: ignore[union-attr]
         before, q = live.moment, live.moment.q
         live.drag((-0.4, 0.0, 0.0))
         live.tab.page.mouse.up()

@@ -14,9 +14,9 @@ from proxcgal.recording.reader import Recording, read_recording
 from proxcgal.recording.writer import Recorder
 from proxcgal.scenario.loading import load_scenario
 from proxcgal.trial.trial import run_trial
-from proxcgal.viewer.access import close, serve
-from proxcgal.viewer.replay_page import ReplayPage, said
-from proxcgal.viewer.replayed import replayed
+from proxcgal.viewer.page_server import close, serve
+from proxcgal.viewer.replay_moments import replay_moments
+from proxcgal.viewer.replay_page import ReplayPage, comparison_text
 
 
 @pytest.fixture(scope="module")
@@ -28,20 +28,20 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
 
 
 def test_a_recording_recomputed_is_the_same_bit_for_bit_and_says_so(recording: Recording) -> None:
-    run = replayed(recording, 15.0)
+    run = replay_moments(recording, 15.0)
     assert run.same == run.ticks == 200
-    assert "all 200 answers are those recorded, bit for bit" in said(run, None)
+    assert "all 200 answers are those recorded, bit for bit" in comparison_text(run, None)
     assert run.moments[0].elapsed == 0.0
     assert run.moments[-1].elapsed == pytest.approx(1.99)
     assert len(run.moments[-1].kept_W) == recording.ticks[-1].result.cloud_points
 
 
 def test_other_settings_are_compared_with_what_was_recorded(recording: Recording) -> None:
-    run = replayed(recording, 15.0)
-    again = replayed(recording, 15.0, "sm", ["controller.d_min=0.4"], ahead=True)
+    run = replay_moments(recording, 15.0)
+    again = replay_moments(recording, 15.0, "sm", ["controller.d_min=0.4"], ahead=True)
     assert again.same is not None
     assert again.same < again.ticks
-    assert "as sm with what was asked for" in said(run, again)
+    assert "as sm with what was asked for" in comparison_text(run, again)
     for then, now in zip(run.moments, again.moments, strict=True):
         assert np.array_equal(then.q, now.q)
 
@@ -49,10 +49,10 @@ def test_other_settings_are_compared_with_what_was_recorded(recording: Recording
 def test_the_time_line_scrubs(
     recording: Recording, open_tab: Callable[[], Tab], tmp_path: Path
 ) -> None:
-    run = replayed(recording, 15.0)
-    again = replayed(recording, 15.0, "sm", ahead=True)
-    server, gate = serve("127.0.0.1", 0, label="replay")
-    page = ReplayPage(server, gate, run, again, said(run, again))
+    run = replay_moments(recording, 15.0)
+    again = replay_moments(recording, 15.0, "sm", ahead=True)
+    server, access = serve("127.0.0.1", 0, label="replay")
+    page = ReplayPage(server, access, run, again, comparison_text(run, again))
     try:
         tab = open_tab()
         tab.open(f"http://127.0.0.1:{server.get_port()}/")
@@ -74,7 +74,7 @@ def test_the_time_line_scrubs(
         tab.page.get_by_role("button", name="play", exact=True).click()
         assert until(lambda: page.row > 5)
         assert tab.errors == []
-        assert gate.dropped == 0
+        assert access.dropped == 0
         tab.page.close()
     finally:
         page.close()
@@ -85,9 +85,9 @@ def test_the_buttons_go_from_moment_to_moment_whatever_the_tick(tmp_path: Path) 
     scenario = load_scenario("front_plane", ["duration=0.5", "simulation.control_hz=250.0"])
     with Recorder(tmp_path / "wb.mcap") as recorder:
         run_trial(scenario, "wb", recorder=recorder)
-    run = replayed(read_recording(tmp_path / "wb.mcap"), 15.0)
-    server, gate = serve("127.0.0.1", 0, label="replay")
-    page = ReplayPage(server, gate, run, None, "")
+    run = replay_moments(read_recording(tmp_path / "wb.mcap"), 15.0)
+    server, access = serve("127.0.0.1", 0, label="replay")
+    page = ReplayPage(server, access, run, None, "")
 
     async def nothing() -> None: ...
 

@@ -35,7 +35,7 @@ def on(trial: WalkTrial) -> np.ndarray:
 
 
 def dragged(trial: WalkTrial, T_W: np.ndarray, way: tuple[float, ...], seconds: float) -> None:
-    """The hand goes that way, told 20 times a second."""
+    """The hand goes that way, update 20 times a second."""
     steps = max(round(20.0 * seconds), 1)
     for k in range(steps):
         wanted = T_W.copy()

@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
-import time as clock
-from contextlib import nullcontext
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Literal, get_args
 
 import tyro
-import tyro.extras
 
 from proxcgal.cli.options import (
     ControllerName,
@@ -24,27 +18,8 @@ from proxcgal.cli.options import (
 )
 from proxcgal.core.errors import ConfigError
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from proxcgal.recording.writer import RecordedTicks
-    from proxcgal.study.campaign import Campaign, Ended, Trial
-    from proxcgal.study.kind import Kind
-    from proxcgal.study.store import Outcome, Store
-    from proxcgal.study.workers import Pool
-
-#: Module that holds each kind as its `KIND`.
-KINDS = {
-    "static": "proxcgal.study.static.campaign",
-    "faults": "proxcgal.study.faults.campaign",
-    "walkthrough": "proxcgal.study.walkthrough.campaign",
-    "joint": "proxcgal.study.joint.campaign",
-    "hri": "proxcgal.study.hri.campaign",
-}
-if TYPE_CHECKING:
-    KindName = str
-else:
-    KindName = tyro.extras.literal_type_from_choices(KINDS)
+#: Those of `study.kinds`, which takes long to import.
+KindName = Literal["static", "faults", "walkthrough", "joint", "hri"]
 
 
 @dataclass(frozen=True)
@@ -75,7 +50,9 @@ class CampaignOptions:
       proxcgal campaign static --runs 1000 --cluster tcp://10.0.0.1:8786
     """
 
-    kind: Annotated[KindName, tyro.conf.Positional, tyro.conf.arg(metavar="|".join(KINDS))]
+    kind: Annotated[
+        KindName, tyro.conf.Positional, tyro.conf.arg(metavar="|".join(get_args(KindName)))
+    ]
     """What is repeated."""
     runs: Number = None
     """Draws of each scene, runs of each fault and robot, sensed runs of each joint scene and start,
@@ -118,70 +95,34 @@ class CampaignOptions:
 
 def campaign_command(options: CampaignOptions, command: str) -> int:
     """Runs what is unfinished; prints tables, what was kept, what failed, the report's path."""
-    from proxcgal.core.progress import announce
-    from proxcgal.core.provenance import origin
-    from proxcgal.evaluation.metrics import write_bytes, write_json, write_text
-    from proxcgal.report.report import write_report
-    from proxcgal.study.campaign_picture import show_moving
-    from proxcgal.study.figures import png
-    from proxcgal.study.kind import CampaignRequest
-    from proxcgal.study.store import Store
-    from proxcgal.study.table import parquet, tidy
-    from proxcgal.study.workers import Pool, default_workers
-    from proxcgal.study.worst_recordings import keep_worst
+    from proxcgal.report.write_report import write_report
+    from proxcgal.study.campaign_kind import CampaignRequest
+    from proxcgal.study.campaign_run import CampaignEffort, print_campaign, run_campaign
+    from proxcgal.study.kinds import KINDS
 
-    begin = clock.monotonic()
-    workers, kept = checked_workers(options.workers), _kept(options)
-    kind: Kind = import_module(KINDS[options.kind]).KIND
-    inputs = options.runs if options.subjects is None else options.subjects
-    runs = kind.runs if inputs is None else inputs
+    workers, recorded = checked_workers(options.workers), _recorded(options)
+    kind = KINDS[options.kind]
+    runs = options.runs if options.subjects is None else options.subjects
     request = CampaignRequest(
-        runs=runs, seed=options.seed, scenarios=options.scenario,
+        runs=kind.runs if runs is None else runs, seed=options.seed, scenarios=options.scenario,
         overrides=tuple(flat(options.set)), controllers=tuple(dict.fromkeys(options.controller)),
         jitter=not options.no_jitter,
     )  # fmt: skip
-    announce("drawing scenes (a robot's first time takes a while)", quiet=options.quiet)
-    campaign = kind.plan(request)
-    _check(campaign)
-    workers = workers or default_workers(len(campaign.trials))
+    effort = CampaignEffort(
+        workers=workers, cluster=options.cluster, recorded=recorded,
+        ticks="all" if options.every_tick else "scans", picture=not options.no_picture,
+        quiet=options.quiet,
+    )  # fmt: skip
     folder = options.out or Path("out") / f"campaign-{options.kind}"
-    with (
-        Pool(workers, options.cluster) as pool,
-        Store(folder, {**campaign.description, "made_with": _packages()}) as store,
-    ):
-        ended = _perform(campaign, store, pool, folder, options.quiet)
-        table = tidy(ended, campaign.columns)
-        worst = kind.worst(table)[:kept]
-        chosen = [next(e for e in ended if e.trial.key == key) for key in worst]
-        ticks: RecordedTicks = "all" if options.every_tick else "scans"
-        with nullcontext(pool) if options.cluster is None else Pool(workers) as near:
-            recorded = keep_worst(chosen, folder, ticks, near, quiet=options.quiet)
-            if kind.shown is not None and not options.no_picture:
-                show_moving(kind.shown(campaign), folder, near, quiet=options.quiet)
-        failed = [e for e in ended if e.outcome.error is not None]
-        summary = {
-            "campaign": options.kind, "seed": options.seed, "runs": runs,
-            "trials": len(ended), "failed": [_failure(e) for e in failed],
-            **kind.analyse(table, campaign), "worst": recorded,
-        }  # fmt: skip
-        if kind.shown is not None:
-            summary["moving"] = [
-                {**trial.tags, "controller": trial.controller} for trial in kind.shown(campaign)
-            ]
-        for name, figure in kind.figures(table, summary).items():
-            write_bytes(folder / name, png(figure))
-        for name, text in (kind.pages(summary) if kind.pages else {}).items():
-            write_text(folder / name, text)
-        write_bytes(folder / "trials.parquet", parquet(table))
-        write_json(folder / "run.json", origin(command) | _times(ended, begin))
-        write_json(folder / "summary.json", summary)
-        report = write_report(folder)
-    _print(kind, summary, folder)
+    summary = run_campaign(options.kind, kind, request, folder, command, effort)
+    report = write_report(folder)
+    print_campaign(kind, summary, folder)
     print(report)
-    return 1 if failed or any("error" in entry for entry in recorded) else 0
+    failed = summary["failed"] or any("error" in entry for entry in summary["worst"])
+    return 1 if failed else 0
 
 
-def _kept(options: CampaignOptions) -> int:
+def _recorded(options: CampaignOptions) -> int:
     """How many of the worst are recorded. Raises: ConfigError: also for the other options."""
     problems = []
     form, _, kept = options.keep.partition(":")
@@ -208,88 +149,3 @@ def _kept(options: CampaignOptions) -> int:
     if problems:
         raise ConfigError("\n".join(problems))
     return int(kept or 0)
-
-
-def _packages() -> dict[str, str]:
-    """What a trial's numbers depend on: those of other versions are not put beside them."""
-    from proxcgal.core.versions import versions
-
-    return {name: v for name, v in versions().items() if name not in ("python", "machine")}
-
-
-def _check(campaign: Campaign) -> None:
-    """Sets one trial of each scene up, so that nothing is written where something does not fit."""
-    from proxcgal.study.runs.results import check
-    from proxcgal.study.trials import robot_of
-
-    firsts = {trial.scenario.name: trial for trial in reversed(campaign.trials)}
-    controllers = tuple(dict.fromkeys(trial.controller for trial in campaign.trials))
-    for trial in firsts.values():
-        check(trial.scenario, controllers, robot_of(trial.scenario), quiet=True)
-
-
-def _perform(
-    campaign: Campaign, store: Store, pool: Pool, folder: Path, quiet: bool
-) -> list[Ended]:
-    """Runs the unfinished trials under a progress bar."""
-    from proxcgal.core.progress import Progress, announce
-    from proxcgal.study.campaign import run_campaign, unfinished
-
-    todo = unfinished(campaign, store)
-    there = len(campaign.trials) - len(todo)
-    if there:
-        announce(f"{there} of {len(campaign.trials)} trials are there already", quiet=quiet)
-    ended = there
-    sizes = [trial.scenario.duration for trial in todo]
-    with Progress("simulating", sizes, "s", quiet=quiet) as progress:
-
-        def done(trial: Trial, outcome: Outcome) -> None:
-            nonlocal ended
-            ended += 1
-            text = f"failed: {outcome.error}" if outcome.error else f"{outcome.wall_s:.1f} s"
-            progress.finished(f"{ended} of {len(campaign.trials)}: {trial.name}: {text}")
-
-        try:
-            return run_campaign(campaign, store, pool, progress.shares, done)
-        except KeyboardInterrupt:
-            kept = len(campaign.trials) - len(unfinished(campaign, store))
-            raise KeyboardInterrupt(
-                f"{kept} of {len(campaign.trials)} trials are kept in {folder}; the same command "
-                "goes on from there"
-            ) from None
-
-
-def _failure(ended: Ended) -> dict[str, Any]:
-    return {
-        "name": ended.trial.name, "error": ended.outcome.error, "command": ended.trial.command
-    }  # fmt: skip
-
-
-def _times(ended: Sequence[Ended], begin: float) -> dict[str, float]:
-    """What it took: the last process alone, and all trials whenever they ran."""
-    return {
-        "wall_s": clock.monotonic() - begin,
-        "trials_wall_s": sum(e.outcome.wall_s for e in ended),
-        "simulated_s": sum(e.trial.scenario.duration for e in ended),
-    }
-
-
-def _print(kind: Kind, summary: dict[str, Any], folder: Path) -> None:
-    for listing in kind.listings(summary):
-        print(f"{listing}\n")
-    for sentence in kind.verdicts(summary):
-        print(sentence)
-    if summary["worst"]:
-        print(
-            f"\nThe worst of {kind.worst_of}, recorded; what steps through each, and what runs it "
-            "again:"
-        )
-    for entry in summary["worst"]:
-        if "error" in entry:
-            print(f"proxcgal: {entry['name']}: not recorded: {entry['error']}", file=sys.stderr)
-            continue
-        print(f"  {shlex.join(('proxcgal', 'replay', str(folder / entry['recording'])))}")
-        print(f"    {entry['command']}")
-    for entry in summary["failed"]:
-        print(f"proxcgal: {entry['name']}: failed: {entry['error']}", file=sys.stderr)
-        print(f"proxcgal:   {entry['command']}", file=sys.stderr)

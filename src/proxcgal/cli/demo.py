@@ -39,28 +39,23 @@ class DemoOptions:
 
 def demo_command(options: DemoOptions, command: str) -> int:
     """Runs the demo; the report's path is the last line printed."""
-    from proxcgal.cli.run import conclude
-    from proxcgal.core.provenance import origin
-    from proxcgal.report.report import write_report
+    from proxcgal.report.write_report import write_report
     from proxcgal.scenario.loading import USUAL, load_scenario
-    from proxcgal.study.runs.results import Plan, check, combine, perform, ready
+    from proxcgal.study.runs.scenes import ScenePlan, run_scenes
 
     workers = checked_workers(options.workers)
     changes = [f"seed={options.seed}", *flat(options.set)]
     scenarios = [load_scenario(name, changes) for name in SCENARIOS]
-    for scenario in scenarios:
-        check(scenario, USUAL, quiet=options.quiet)
     plans = [
-        Plan(scenario=scenario, controllers=USUAL, folder=options.out / scenario.name)
+        ScenePlan(scenario=scenario, controllers=USUAL, folder=options.out / scenario.name)
         for scenario in scenarios
     ]
-    made = origin(command)
-    ready([options.out])
-    summaries = perform(
-        plans, made, workers=workers, pictures=not options.no_picture, quiet=options.quiet
-    )
-    combine(options.out, summaries, made)
-    return conclude(summaries, write_report(options.out))
+    failed = run_scenes(
+        plans, command, together=options.out, workers=workers,
+        pictures=not options.no_picture, quiet=options.quiet,
+    )  # fmt: skip
+    print(write_report(options.out))
+    return 1 if failed else 0
 
 
 if __name__ == "__main__":

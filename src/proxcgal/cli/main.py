@@ -1,4 +1,4 @@
-"""The command `proxcgal`: what is typed becomes a call, what goes wrong one line a problem."""
+"""The command `proxcgal`: arguments become a call, problems a line each."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ COMMANDS = {
     "view": "proxcgal.cli.view",
     "serve": "proxcgal.cli.serve",
     "replay": "proxcgal.cli.replay",
-    "report": "proxcgal.report.report",
+    "report": "proxcgal.cli.report",
     "scenarios": "proxcgal.cli.lists",
     "robots": "proxcgal.cli.lists",
 }
@@ -67,7 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: without the program's name; None takes the process's own.
 
     Returns:
-        0 done, 1 failed on the way (disk full, the arm met itself), 2 what ProxError tells (bad
+        0 done, 1 failed on the way (disk full, the arm met itself), 2 a ProxError (bad
         input, a simulation that cannot go on), 130 interrupted.
     """
     arguments = list(sys.argv[1:] if arguments is None else arguments)
@@ -83,7 +83,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if command not in COMMANDS:
         near = difflib.get_close_matches(command, COMMANDS, n=1)
         hint = f"; did you mean {near[0]}?" if near else ""
-        _tell(f"command {command!r}: unknown{hint} There are: {', '.join(COMMANDS)}")
+        _print_problems(f"command {command!r}: unknown{hint} There are: {', '.join(COMMANDS)}")
         return BAD_INPUT
     return call(command, rest)
 
@@ -91,23 +91,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def call(command: str, arguments: Sequence[str]) -> int:
     """Parses the options of one command and runs it; the exit code, as `main` has it."""
     try:
-        options = parse(command, arguments)
+        options = parse_options(command, arguments)
     except SystemExit as end:  # help
         return int(end.code or 0)
     except ProxError as error:
-        _tell(str(error))
+        _print_problems(str(error))
         return BAD_INPUT
     run: Callable[[Any, str], int] = getattr(import_module(COMMANDS[command]), f"{command}_command")
-    text = shlex.join(("proxcgal", command, *arguments))  # what reports say they were made by
+    text = shlex.join(("proxcgal", command, *arguments))  # for reports
     return guarded(lambda: run(options, text))
 
 
-def parse(command: str, arguments: Sequence[str]) -> Any:
+def parse_options(command: str, arguments: Sequence[str]) -> Any:
     """The options of one command. Raises: SystemExit after help; ConfigError, what is wrong."""
-    from proxcgal.cli.parsing import parse as parsed
+    from proxcgal.cli.parsing import parse_words
 
     options_type = getattr(import_module(COMMANDS[command]), f"{command.capitalize()}Options")
-    return parsed(options_type, f"proxcgal {command}", arguments)
+    return parse_words(options_type, f"proxcgal {command}", arguments)
 
 
 def guarded(work: Callable[[], int]) -> int:
@@ -116,17 +116,17 @@ def guarded(work: Callable[[], int]) -> int:
     try:
         return work()
     except ProxError as error:
-        _tell(str(error))
+        _print_problems(str(error))
         return BAD_INPUT
-    except BrokenPipeError:  # `proxcgal replay FILE | head`: nobody reads on, and that is fine
+    except BrokenPipeError:  # the reader has ended, as in `proxcgal replay FILE | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return OK
     except OSError as error:
         place = f"{error.filename}: " if error.filename else ""
-        _tell(f"{place}{error.strerror or error}")
+        _print_problems(f"{place}{error.strerror or error}")
         return FAILED
     except KeyboardInterrupt as stop:
-        _tell("interrupted" + (f"; {stop}" if str(stop) else ""))
+        _print_problems("interrupted" + (f"; {stop}" if str(stop) else ""))
         return INTERRUPTED
 
 
@@ -135,7 +135,7 @@ def _note(message: Warning | str, *_: object, **__: object) -> None:
     print(f"proxcgal: note: {message}", file=sys.stderr)
 
 
-def _tell(message: str) -> None:
+def _print_problems(message: str) -> None:
     for line in message.splitlines() or [""]:
         print(f"proxcgal: {line}", file=sys.stderr)
 

@@ -1,4 +1,4 @@
-"""From typed words to a command's options; what does not fit is told in one line."""
+"""From typed words to a command's options; a message of one line where they do not fit."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from proxcgal.core.errors import ConfigError
 
-#: What a type takes, in words.
+#: What a type takes.
 _WORDS = {int: "a whole number", float: "a number"}
 
 
-def parse(options_type: type, program: str, arguments: Sequence[str]) -> Any:
+def parse_words(options_type: type, program: str, arguments: Sequence[str]) -> Any:
     """The options in these words.
 
     Args:
@@ -33,9 +33,9 @@ def parse(options_type: type, program: str, arguments: Sequence[str]) -> Any:
     import tyro  # 0.2 s that `--help` and a wrong command need not wait for
 
     _refuse_none(options_type, arguments)
-    told = io.StringIO()
+    message = io.StringIO()
     try:
-        with redirect_stderr(told):
+        with redirect_stderr(message):
             return tyro.cli(
                 options_type,
                 prog=program,
@@ -46,7 +46,7 @@ def parse(options_type: type, program: str, arguments: Sequence[str]) -> Any:
     except SystemExit as end:
         if not end.code:
             raise
-        box = _opened(told.getvalue())
+        box = _unboxed(message.getvalue())
     raise ConfigError(_line(options_type, program, arguments, box)) from None
 
 
@@ -76,13 +76,13 @@ def _line(options_type: type, program: str, arguments: Sequence[str], box: str) 
         name = _shown(options_type, found[2])
         return f"{name} {found[1]}: {_allowed(options_type, found[2])}"
     if found := re.match(r"Error parsing (\S+?): ", box):
-        value = _given(found[1], arguments)
+        value = _typed_value(found[1], arguments)
         return f"{_shown(options_type, found[1])} {value}: {_allowed(options_type, found[1])}"
     return box
 
 
-def _opened(box: str) -> str:
-    """What stands in the parser's box under its title, up to the next rule, as one line."""
+def _unboxed(box: str) -> str:
+    """The text in the parser's box under its title, up to the next rule, as one line."""
     inside: list[str] = []
     for line in re.sub(r"\x1b\[[0-9;]*m", "", box).splitlines()[1:]:  # where it has no colours
         words = line.strip("│| ")
@@ -127,7 +127,7 @@ def _shown(options_type: type, name: str) -> str:
     return name if name.startswith("--") or _field(options_type, name) is None else name.upper()
 
 
-def _given(name: str, arguments: Sequence[str]) -> str:
+def _typed_value(name: str, arguments: Sequence[str]) -> str:
     """The value as it was typed."""
     for word, value in zip(arguments, [*arguments[1:], ""], strict=True):
         if word == name:

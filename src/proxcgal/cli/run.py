@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import tyro
 
@@ -18,12 +18,7 @@ from proxcgal.cli.options import (
     checked_workers,
     flat,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from proxcgal.evaluation.metrics import Summary
-    from proxcgal.scenario.loading import Scenario
+from proxcgal.core.errors import ConfigError
 
 
 @dataclass(frozen=True)
@@ -78,13 +73,9 @@ class RunOptions:
 
 def run_command(options: RunOptions, command: str) -> int:
     """Runs the trials; prints the table and the report's path."""
-    from proxcgal.core.errors import ConfigError
-    from proxcgal.core.provenance import origin
-    from proxcgal.report.report import write_report
-    from proxcgal.scenario.joint import JointScenario
-    from proxcgal.scenario.loading import HriScenario, load_scenario
-    from proxcgal.study.runs.joint import run_joint
-    from proxcgal.study.runs.results import Plan, check, perform
+    from proxcgal.report.write_report import write_report
+    from proxcgal.scenario.loading import load_scenario
+    from proxcgal.study.runs.run import run_scenario
 
     if options.controller == ():
         raise ConfigError(
@@ -94,53 +85,39 @@ def run_command(options: RunOptions, command: str) -> int:
     for name, number, least in (("--seed", options.seed, 0), ("--subject", options.subject, 1)):
         if number is not None and not least <= number < 2**63:
             raise ConfigError(f"{name} {number}: must be {least} to {2**63 - 1}")
-    if options.subject is not None:
-        base = load_scenario(options.scenario, flat(options.set))
-        if not isinstance(base, HriScenario):
-            raise ConfigError(
-                f'--subject {options.subject}: {options.scenario} has kind = "{base.kind}" and no '
-                'operator; scenarios of kind = "hri" have one'
-            )
-        if base.operator.recording is not None:
-            raise ConfigError(
-                f"--subject {options.subject}: operator.recording = {base.operator.recording}: its "
-                "person is always the same; leave one of the two out"
-            )
+    _check_subject(options)
     scenario = load_scenario(options.scenario, overrides(options))
-    if scenario.kind == "walkthrough":
-        if options.controller:
-            raise ConfigError(
-                f"--controller {' '.join(options.controller)}: {options.scenario} has kind = "
-                '"walkthrough", where a hand guides the arm: no controllers to choose from'
-            )
-        return _run_walkthrough(scenario, options, command)
-    controllers = tuple(dict.fromkeys(options.controller or scenario.controllers()))
-    folder = options.out or Path("out") / scenario.name
-    if isinstance(scenario, JointScenario):
-        return run_joint(
-            scenario, controllers, folder, command, workers=workers, quiet=options.quiet
+    if scenario.kind == "walkthrough" and options.controller:
+        raise ConfigError(
+            f"--controller {' '.join(options.controller)}: {options.scenario} has kind = "
+            '"walkthrough", where a hand guides the arm: no controllers to choose from'
         )
-    check(scenario, controllers, quiet=options.quiet)
-    plan = Plan(scenario=scenario, controllers=controllers, folder=folder)
-    summaries = perform(
-        [plan],
-        origin(command),
-        workers=workers,
-        pictures=not options.no_picture,
-        quiet=options.quiet,
-    )
-    return conclude(summaries, write_report(plan.folder))
-
-
-def _run_walkthrough(scenario: Scenario, options: RunOptions, command: str) -> int:
-    """A walk-through has no controllers to choose from, and one process does it."""
-    from proxcgal.core.provenance import origin
-    from proxcgal.scenario.walkthrough import WalkScenario
-    from proxcgal.study.runs.walkthrough import run_walkthrough
-
-    assert isinstance(scenario, WalkScenario)
     folder = options.out or Path("out") / scenario.name
-    return run_walkthrough(scenario, folder, origin(command), quiet=options.quiet)
+    failed = run_scenario(
+        scenario, options.controller or (), folder, command, workers=workers,
+        pictures=not options.no_picture, quiet=options.quiet,
+    )  # fmt: skip
+    print(write_report(folder))
+    return 1 if failed else 0
+
+
+def _check_subject(options: RunOptions) -> None:
+    """Raises: ConfigError: a subject for a scenario without a virtual operator."""
+    from proxcgal.scenario.loading import HriScenario, load_scenario
+
+    if options.subject is None:
+        return
+    base = load_scenario(options.scenario, flat(options.set))
+    if not isinstance(base, HriScenario):
+        raise ConfigError(
+            f'--subject {options.subject}: {options.scenario} has kind = "{base.kind}" and no '
+            'operator; scenarios of kind = "hri" have one'
+        )
+    if base.operator.recording is not None:
+        raise ConfigError(
+            f"--subject {options.subject}: operator.recording = {base.operator.recording}: its "
+            "person is always the same; leave one of the two out"
+        )
 
 
 def overrides(options: RunOptions) -> list[str]:
@@ -161,24 +138,3 @@ def overrides(options: RunOptions) -> list[str]:
     if options.seed is not None:
         changes.append(f"seed={options.seed}")
     return changes + flat(options.set)
-
-
-def conclude(summaries: Sequence[Summary], report: Path) -> int:
-    """Prints the table, what failed, and last the report's path; the exit code."""
-    import sys
-
-    from proxcgal.evaluation.metrics import SELF_LIMIT_M, coverage_lines, table
-
-    print(table(summaries))
-    for summary in summaries:
-        for line in coverage_lines(summary["scenario"], summary["closest_points"]):
-            print(line)
-    failed = [s for s in summaries if s["failed"]]
-    for summary in failed:
-        print(
-            f"proxcgal: {summary['scenario']}: failed: the arm came within "
-            f"{summary['self_min_m']:.3f} m of itself, allowed is {SELF_LIMIT_M} m",
-            file=sys.stderr,
-        )
-    print(report)
-    return 1 if failed else 0

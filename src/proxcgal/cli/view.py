@@ -2,21 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import secrets
-import sys
-import warnings
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import tyro
 
 from proxcgal.cli.options import ControllerName, Settings, flat
 from proxcgal.core.errors import ConfigError
-
-if TYPE_CHECKING:
-    from proxcgal.scenario.loading import Scenario
-    from proxcgal.viewer.live_page import LivePage
 
 LOCAL = "127.0.0.1"
 PORT = 8080
@@ -56,95 +48,17 @@ class ViewOptions:
 def view_command(options: ViewOptions, command: str) -> int:
     """Serves until interrupted; prints the page's address."""
     from proxcgal.scenario.loading import load_scenario
-    from proxcgal.viewer.access import close, serve
-    from proxcgal.viewer.live_page import LivePage
+    from proxcgal.viewer.live_view import view_scenario
+    from proxcgal.viewer.page_server import checked_token
 
     token = checked_token(options.host, options.port, options.token)
     scenario = load_scenario(options.scenario, flat(options.set))
-    _check(scenario, options.controller)
-    server, gate = serve(
-        options.host, options.port, label=f"proxcgal: {scenario.name}", token=token
+    if scenario.kind == "walkthrough" and options.controller is not None:
+        raise ConfigError(
+            f'--controller {options.controller}: {scenario.name} has kind = "walkthrough", where a '
+            "hand guides the arm: no controllers to choose from"
+        )
+    view_scenario(
+        scenario, options.controller or "wb", host=options.host, port=options.port, token=token
     )
-    page = LivePage(server, gate, scenario, options.controller or "wb")
-    os.nice(5)  # the page yields to the simulation, which has its process by now
-    try:
-        page.wait_for_scene()
-        print(address(options.host, server.get_port(), token), flush=True)
-        _attend(page)
-    finally:
-        page.close()
-        close(server)
     return 0
-
-
-def _check(scenario: Scenario, controller: str | None) -> None:
-    """Does it fit? A walk-through's guard says what it monitors and what was accepted.
-
-    Raises:
-        ConfigError: what does not.
-    """
-    from proxcgal.scenario.walkthrough import WalkScenario
-    from proxcgal.study.runs.results import check
-    from proxcgal.trial.walkthrough.setup import WalkSetup
-
-    if not isinstance(scenario, WalkScenario):
-        check(scenario, [controller or "wb"])
-        return
-    if controller is not None:
-        raise ConfigError(
-            f'--controller {controller}: {scenario.name} has kind = "walkthrough", where a hand '
-            "guides the arm: no controllers to choose from"
-        )
-    print("\n".join(WalkSetup.of(scenario).told()))
-
-
-def checked_token(host: str, port: int, token: str | None) -> str | None:
-    """The token that pages must show, with a warning where others than this machine can ask.
-
-    Raises:
-        ConfigError: an address or a port that there is not, a token that is too easy to guess.
-    """
-    from proxcgal.viewer.access import LOOPBACK, check_free
-
-    if not 0 <= port <= 65535:
-        raise ConfigError(f"--port {port}: must be 0 to 65535")
-    if token is not None and (len(token) < 8 or not token.isascii() or not _plain(token)):
-        raise ConfigError(
-            f"--token {token!r}: must be 8 characters or more, letters, digits, - and _ only"
-        )
-    if host in LOOPBACK:
-        return token
-    check_free(host, port)  # no word of who can reach a page that cannot be
-    warnings.warn(
-        f"--host {host}: others than this machine can reach the page; it is not encrypted, and "
-        "whoever knows the token can look on and drag the obstacle",
-        stacklevel=2,
-    )
-    return token or secrets.token_urlsafe(16)
-
-
-def address(host: str, port: int, token: str | None) -> str:
-    """What to open in a browser."""
-    name = {"0.0.0.0": LOCAL, "::": "[::1]"}.get(host, f"[{host}]" if ":" in host else host)
-    return f"http://{name}:{port}/" + (f"?token={token}" if token else "")
-
-
-def _plain(token: str) -> bool:
-    return token.replace("-", "").replace("_", "").isalnum()
-
-
-def _attend(page: LivePage) -> None:
-    """Until the simulation ends; on a terminal Enter begins anew, out of a STOP too."""
-    if not sys.stdin.isatty():
-        page.wait()
-        return
-    import threading
-
-    print("Enter: begin anew, out of a STOP too; Ctrl-C: end", flush=True)
-
-    def listen() -> None:
-        for _ in sys.stdin:
-            page.queue.want(anew=True)
-
-    threading.Thread(target=listen, daemon=True).start()
-    page.wait()

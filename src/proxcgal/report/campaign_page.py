@@ -5,106 +5,64 @@ from __future__ import annotations
 import shlex
 from collections.abc import Iterator
 from html import escape
-from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from proxcgal.cli.campaign import KINDS
-from proxcgal.core.errors import ConfigError
-from proxcgal.report.document import (
-    PICTURE_BYTES,
-    REPLAY_BYTES,
-    document,
-    origin_part,
-    picture,
-)
+from proxcgal.report.document import Pictures, document, origin_part
+from proxcgal.report.html_table import listing_part
 from proxcgal.report.replays import Replays
-from proxcgal.report.stored import StoredCampaign
+from proxcgal.report.stored_results import StoredResults
+from proxcgal.study.campaign_kind import CampaignKind
 from proxcgal.study.worst_recordings import FOLDER
 
-if TYPE_CHECKING:
-    from proxcgal.study.kind import Kind, Listing
+
+def campaign_page(kind: CampaignKind, stored: StoredResults) -> str:
+    """The page of a campaign: valid HTML, everything inside."""
+    return document(kind.title, _parts(kind, stored))
 
 
-def campaign_page(stored: StoredCampaign) -> str:
-    """The page of a campaign: valid HTML, everything inside.
-
-    Raises:
-        ConfigError: a kind that is not known here, or a summary of another form.
-    """
-    path, name = stored.folder / "summary.json", stored.summary["campaign"]
-    if name not in KINDS:
-        raise ConfigError(f"{path}: campaign = {name!r}: there are {', '.join(KINDS)}")
-    kind: Kind = import_module(KINDS[name]).KIND
-    try:
-        return document(kind.title, _parts(kind, stored))
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        reason = f"{type(error).__name__}: {error}"
-        raise ConfigError(f"{path}: not the summary of a {name} campaign: {reason}") from None
-
-
-def _parts(kind: Kind, stored: StoredCampaign) -> Iterator[str]:
+def _parts(kind: CampaignKind, stored: StoredResults) -> Iterator[str]:
     summary = stored.summary
-    told = kind.introduction
-    yield f"<p>{escape(told if isinstance(told, str) else told(summary))}</p>"
+    text = kind.introduction
+    yield f"<p>{escape(text if isinstance(text, str) else text(summary))}</p>"
     for sentence in kind.verdicts(summary):
         yield f"<p>{escape(sentence)}</p>"
     for listing in kind.listings(summary):
         yield from listing_part(listing)
-    replays = Replays(REPLAY_BYTES)
+    replays = Replays()
     worst = _replay_of_worst(stored, replays)
-    budget = PICTURE_BYTES - replays.used
+    pictures = Pictures(replays.used)
     for name, caption in kind.captions(summary).items():
-        part, used = picture(stored.folder / Path(name).name, caption, budget)
-        budget -= used
-        yield part
+        yield pictures.part(stored.folder / Path(name).name, caption)
     yield from _commands(stored, worst, kind.worst_of)
     yield from origin_part(stored.about)
     yield from replays.parts()
 
 
-def listing_part(listing: Listing) -> Iterator[str]:
-    """A table as HTML."""
-    yield f'<div class="scroll"><table><caption>{escape(listing.caption)}</caption><thead><tr>'
-    for column, (name, unit) in enumerate(zip(listing.names, listing.units, strict=True)):
-        side = ' class="left"' if column < listing.left else ""
-        small = f"<small>{escape(unit)}</small>" if unit else ""
-        yield f"<th{side}>{escape(name)}{small}</th>"
-    yield "</tr></thead><tbody>"
-    for row in listing.rows:
-        yield "<tr>"
-        for column, cell in enumerate(row):
-            side = ' class="left"' if column < listing.left else ""
-            yield f"<td{side}>{escape(cell)}</td>"
-        yield "</tr>"
-    yield "</tbody></table></div>"
-
-
-def _replay_of_worst(stored: StoredCampaign, replays: Replays) -> str:
+def _replay_of_worst(stored: StoredResults, replays: Replays) -> str:
     """The first of the worst that was recorded, in 3D."""
     for entry in stored.summary["worst"]:
-        # A summary's words must not lead out of the folder.
+        # A summary's text must not lead out of the folder.
         file = stored.folder / FOLDER / Path(str(entry.get("recording", ""))).name
         if file.is_file():
             return replays.of_runs(stored.folder, [file])
     return ""
 
 
-def _commands(stored: StoredCampaign, replay: str, worst_of: str) -> Iterator[str]:
-    """What steps through the worst trials, and what runs them and the failed ones again."""
+def _commands(stored: StoredResults, replay: str, worst_of: str) -> Iterator[str]:
+    """Commands that step through the worst trials, and that run them and the failed ones again."""
     if stored.summary["worst"]:
         yield "<h2>The worst</h2>"
         yield f"<p>Of {escape(worst_of)}.</p>"
         yield replay
     for entry in stored.summary["worst"]:
+        command = escape(str(entry["command"]))
         if "error" in entry:
             reason = f"{entry['name']}: not recorded: {entry['error']}"
             yield f"<p>{escape(reason)}</p>"
-            yield f'<pre class="wrap">{escape(str(entry["command"]))}</pre>'
-            continue
-        file = stored.folder / str(entry["recording"])
-        replay = shlex.join(("proxcgal", "replay", str(file)))
-        yield f'<pre class="wrap">{escape(replay)}\n{escape(str(entry["command"]))}</pre>'
+        else:
+            file = stored.folder / str(entry["recording"])
+            command = f"{escape(shlex.join(('proxcgal', 'replay', str(file))))}\n{command}"
+        yield f'<pre class="wrap">{command}</pre>'
     if stored.summary["failed"]:
         yield "<h2>Failed trials</h2>"
     for entry in stored.summary["failed"]:

@@ -8,11 +8,11 @@ from html import escape
 from importlib import resources
 from pathlib import Path
 
-from proxcgal.report.stored import About
+from proxcgal.report.html_table import cell
+from proxcgal.report.stored_results import About
 
-MAX_BYTES = 10_000_000  # of the whole page
-REPLAY_BYTES = 6_000_000  # of that, at most, for what plays in 3D
-PICTURE_BYTES = MAX_BYTES - 400_000  # of all its pictures; the rest is text
+PAGE_BYTES = 10_000_000  # of the whole page
+PICTURE_BYTES = PAGE_BYTES - 400_000  # of all its pictures; the rest is text
 
 
 #: What the page may load: what lies inside of it. No script, unless something plays.
@@ -40,19 +40,39 @@ def document(title: str, parts: Iterable[str]) -> str:
     return "\n".join([*head, *body, "</body></html>"]) + "\n"
 
 
-def picture(path: Path, caption: str, budget: int) -> tuple[str, int]:
-    """The figure with its picture inside, and the bytes that it takes of the page."""
-    if not path.is_file():
-        return "", 0
-    size = 4 * ((path.stat().st_size + 2) // 3)
-    if size > budget:
-        text = f"left out here to keep the page under {MAX_BYTES // 1_000_000} MB"
-        return f'<p class="soft">{escape(path.name)}: {text}.</p>', 0
-    kind = "gif" if path.suffix == ".gif" else "png"
-    data = base64.b64encode(path.read_bytes()).decode()
-    alt = escape(caption.split(". ")[0], quote=True)
-    part = f'<figure><img src="data:image/{kind};base64,{data}" alt="{alt}">'
-    return part + f"<figcaption>{escape(caption)}</figcaption></figure>", size
+class Pictures:
+    """The figures of one page, as far as its bytes go."""
+
+    def __init__(self, used: int = 0) -> None:
+        """Args: `used` bytes of the page, which pictures may not take."""
+        self._left = PICTURE_BYTES - used
+
+    def part(self, path: Path, caption: str) -> str:
+        """The figure with its picture inside; nothing where there is no such file."""
+        if not path.is_file():
+            return ""
+        size = 4 * ((path.stat().st_size + 2) // 3)
+        if size > self._left:
+            text = f"left out here to keep the page under {PAGE_BYTES // 1_000_000} MB"
+            return f'<p class="soft">{escape(path.name)}: {text}.</p>'
+        self._left -= size
+        kind = "gif" if path.suffix == ".gif" else "png"
+        data = base64.b64encode(path.read_bytes()).decode()
+        alt = escape(caption.split(". ")[0], quote=True)
+        image = f'<img src="data:image/{kind};base64,{data}" alt="{alt}">'
+        return f"<figure>{image}<figcaption>{escape(caption)}</figcaption></figure>"
+
+
+def code_names(names: Iterable[str]) -> str:
+    """File names in a sentence."""
+    return ", ".join(f"<code>{escape(name)}</code>" for name in names)
+
+
+def recordings_part(folder: Path, more: str = "") -> Iterator[str]:
+    """Names the recordings of a folder, where there are any; `more` follows, as HTML."""
+    if files := sorted(folder.glob("*.mcap")):
+        names = code_names(file.name for file in files)
+        yield f'<p class="soft">Recordings of every tick beside this page: {names}.{more}</p>'
 
 
 def origin_part(about: About) -> Iterator[str]:
@@ -63,10 +83,13 @@ def origin_part(about: About) -> Iterator[str]:
     rows = [("made", about.made), ("commit", about.commit), ("machine", about.machine)]
     rows += about.versions.items()
     yield "<table><tbody>"
-    for name, value in rows:
+    for name, value in (*rows, ("[WA]", _PAPER)):
         if value:
-            yield f'<tr><td class="left">{escape(name)}</td>'
-            yield f'<td class="wide">{escape(value)}</td></tr>'
-    yield '<tr><td class="left">[WA]</td><td class="wide">S. Borelli et al., Generating '
-    yield "Whole-Arm Avoidance Motion Through Localized Proximity Sensing, IEEE/ASME Trans. "
-    yield "Mechatronics, 2025, doi:10.1109/TMECH.2025.3582432</td></tr></tbody></table>"
+            yield f"<tr>{cell(name, 'left')}{cell(value, 'wide')}</tr>"
+    yield "</tbody></table>"
+
+
+_PAPER = (
+    "S. Borelli et al., Generating Whole-Arm Avoidance Motion Through Localized Proximity Sensing, "
+    "IEEE/ASME Trans. Mechatronics, 2025, doi:10.1109/TMECH.2025.3582432"
+)

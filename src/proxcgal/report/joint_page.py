@@ -4,35 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from html import escape
-from typing import TYPE_CHECKING, Any
 
-from proxcgal.core.errors import ConfigError
-from proxcgal.report.campaign_page import listing_part
-from proxcgal.report.document import PICTURE_BYTES, document, origin_part, picture
-
-if TYPE_CHECKING:
-    from proxcgal.report.stored import StoredCampaign
+from proxcgal.report.document import Pictures, document, origin_part, recordings_part
+from proxcgal.report.html_table import listing_part
+from proxcgal.report.stored_results import StoredResults
+from proxcgal.study.joint.texts import listings, verdicts
+from proxcgal.study.runs.joint import FIGURE
 
 
-def joint_page(stored: StoredCampaign) -> str:
-    """The page of one scene's runs: valid HTML, everything inside.
-
-    Raises:
-        ConfigError: a summary of another form.
-    """
-    try:
-        return document(f"{stored.summary['scenario']}: 12 joints", _parts(stored))
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        reason = f"{type(error).__name__}: {error}"
-        path = stored.folder / "summary.json"
-        raise ConfigError(f"{path}: not the summary of joint runs: {reason}") from None
+def joint_page(stored: StoredResults) -> str:
+    """The page of one scene's runs: valid HTML, everything inside."""
+    return document(f"{stored.summary['scenario']}: 12 joints", _parts(stored))
 
 
-def _parts(stored: StoredCampaign) -> Iterator[str]:
-    from proxcgal.study.joint.texts import listings, verdicts
-    from proxcgal.study.runs.joint import FIGURE
-
-    summary: dict[str, Any] = stored.summary
+def _parts(stored: StoredResults) -> Iterator[str]:
+    summary = stored.summary
     yield f"<p>{escape(stored.about.description)}</p>"
     for run in summary["runs"]:
         where = f"From {run['init']}, {run['perception']}, {', '.join(run['tasks'])}: "
@@ -42,17 +28,13 @@ def _parts(stored: StoredCampaign) -> Iterator[str]:
     for listing in listings(summary):
         if listing.rows:
             yield from listing_part(listing)
-    part, _ = picture(
+    yield Pictures().part(
         stored.folder / FIGURE,
-        "Speed at the tool by each arm, activations of the tasks, true distance.", PICTURE_BYTES,
-    )  # fmt: skip
-    yield part
+        "Speed at the tool by each arm, activations of the tasks, true distance.",
+    )
     yield (
         '<p class="soft">Kinematic runs: the robot has no inertias. Engineering figures from a '
         "simulation, not a certificate of any kind.</p>"
     )
-    files = sorted(stored.folder.glob("*.mcap"))
-    if files:
-        names = ", ".join(f"<code>{escape(file.name)}</code>" for file in files)
-        yield f'<p class="soft">Recordings of every tick beside this page: {names}.</p>'
+    yield from recordings_part(stored.folder)
     yield from origin_part(stored.about)

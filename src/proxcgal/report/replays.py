@@ -9,7 +9,10 @@ from html import escape
 from pathlib import Path
 
 from proxcgal.core.errors import ProxError
+from proxcgal.viewer.export import viser_client
+from proxcgal.viewer.report_scene import replay_scene, still_scene
 
+REPLAY_BYTES = 6_000_000  # of the page, at most, for the scenes and their player
 ORDER = ("wb", "wb_memory", "sm", "wb_known")  # the first that is there is drawn whole
 _SHOWN = 2  # arms in one scene
 #: Hands the scene to viser's client, in a frame of its own.
@@ -33,9 +36,8 @@ for (const button of document.querySelectorAll("button[data-scene]")) {
 class Replays:
     """Collects the scenes of one page, as far as its bytes go."""
 
-    def __init__(self, budget: int) -> None:
-        """Args: `budget` for all of them and their player [bytes]."""
-        self._budget = budget
+    def __init__(self) -> None:
+        """None yet."""
         self._scenes: list[str] = []
         self._player = ""
 
@@ -56,8 +58,6 @@ class Replays:
             files = [path for path in there if path.is_file()][:_SHOWN]
         if not files:
             return ""
-        from proxcgal.viewer.report_scene import replay_scene
-
         names: tuple[str, ...] = ()
 
         def make() -> bytes:
@@ -80,8 +80,6 @@ class Replays:
 
     def of_scene(self, name: str) -> str:
         """The figure of a built-in scene that stands still; nothing where there is none."""
-        from proxcgal.viewer.report_scene import still_scene
-
         place = self._add(lambda: still_scene(name))
         if not place.startswith("scene"):
             return ""
@@ -108,11 +106,9 @@ class Replays:
         except ProxError as error:
             return str(error)
         if not self._player:
-            from proxcgal.viewer.export import player
-
             # Nothing in it may end the element that it stands in.
-            self._player = json.dumps(player()).replace("<", "\\u003c")
-        if self.used + len(data) > self._budget:
+            self._player = json.dumps(viser_client()).replace("<", "\\u003c")
+        if self.used + len(data) > REPLAY_BYTES:
             return f"it would take {len(data) / 1e6:.1f} MB more than the page may have"
         self._scenes.append(data)
         return f"scene{len(self._scenes) - 1}"

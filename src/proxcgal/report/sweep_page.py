@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from html import escape
 
-from proxcgal.report.document import (
-    PICTURE_BYTES,
-    REPLAY_BYTES,
-    document,
-    origin_part,
-    picture,
-)
+from proxcgal.report.document import Pictures, document, origin_part
+from proxcgal.report.html_table import cell, head, table_part
 from proxcgal.report.replays import Replays
-from proxcgal.report.stored import Exponent, StoredCell, Sweep
-from proxcgal.study.timing.ratios import CYCLE_US, compare, cycle_verdict
+from proxcgal.report.stored_results import Exponent, StoredCell, StoredSweep
+from proxcgal.study.timing.comparison import CYCLE_US, Comparison, compare, cycle_verdict
+from proxcgal.study.timing.grid import METHODS
 
 _CURVES = (
     "Median time of one call from Python against the vertices of each link, both axes logarithmic. "
@@ -32,14 +28,14 @@ CLOUDS = (
 )
 
 
-def sweep_page(sweep: Sweep) -> str:
+def sweep_page(sweep: StoredSweep) -> str:
     """The page of a timing grid: valid HTML, everything inside."""
     return document("Timing of Algorithms 1 and 2", _parts(sweep))
 
 
-def _parts(sweep: Sweep) -> Iterator[str]:
+def _parts(sweep: StoredSweep) -> Iterator[str]:
     cells = sweep.summary.cells
-    robots = dict.fromkeys(cell.robot for cell in cells)
+    robots = dict.fromkeys(each.robot for each in cells)
     yield (
         "<p>How long body removal (Algorithm 1) and the search for the closest pair (Algorithm 2) "
         f"take, on {escape(' and '.join(robots))}, one scan of 30 sensors in a room, as meshes get "
@@ -48,16 +44,14 @@ def _parts(sweep: Sweep) -> Iterator[str]:
         "before it is timed. One thread, called from Python. Algorithm 1 gets the cloud as it was "
         "sensed, Algorithm 2 what the filter leaves of it.</p>"
     )
-    yield f"<p>{escape(cycle_verdict(compare(cell.model_dump() for cell in cells)))}</p>"
-    replays = Replays(REPLAY_BYTES)
+    yield f"<p>{escape(cycle_verdict(compare(each.model_dump() for each in cells)))}</p>"
+    replays = Replays()
     scenes = [replays.of_scene(f"timing_{robot}") for robot in robots]
-    budget = PICTURE_BYTES - replays.used
+    pictures = Pictures(replays.used)
     files = [*PICTURES, *((f"clouds_{robot}.png", CLOUDS) for robot in robots)]
     for name, caption in files:
         # A robot's name is a file's content here: it must not lead out of the folder.
-        part, used = picture(sweep.folder / name.replace("/", "_"), caption, budget)
-        budget -= used
-        yield part
+        yield pictures.part(sweep.folder / name.replace("/", "_"), caption)
     yield from scenes
     yield "<h2>Times</h2>"
     yield from _times(cells)
@@ -75,54 +69,48 @@ def _parts(sweep: Sweep) -> Iterator[str]:
 
 def _times(cells: Sequence[StoredCell]) -> Iterator[str]:
     """A row a pair of cells."""
-    by_key = {_key(cell): cell for cell in cells}
-    yield '<div class="scroll"><table><caption>Medians, 99th percentiles and longest of all calls, '
-    yield f"in microseconds; bold: longer than the sensors' cycle of {CYCLE_US / 1000.0:g} ms. "
-    yield "Ratio: medians, paper over fast.</caption>"
-    yield '<thead><tr><th class="left">robot</th><th class="left">cloud</th>'
-    for name in ("vertices", "points", "algorithm"):
-        yield f"<th>{name}</th>"
-    for method in ("paper", "fast"):
-        for name in ("median", "p99", "max"):
-            yield f"<th>{method}<small>{name}</small></th>"
-    yield "<th>ratio</th></tr></thead><tbody>"
-    for pair in compare(cell.model_dump() for cell in cells):
-        yield f'<tr><td class="left">{escape(pair.robot)}</td>'
-        yield f'<td class="left">{escape(pair.cloud)}</td><td>{pair.vertices}</td>'
-        yield f"<td>{pair.points}</td><td>{pair.algorithm}</td>"
-        for method in ("paper", "fast"):
-            place = (pair.robot, pair.vertices, pair.cloud, pair.points, pair.algorithm, method)
-            cell = by_key[place]
-            for value in (cell.median_us, cell.p99_us, cell.max_us):
+    heads = [head("robot", style="left"), head("cloud", style="left")]
+    heads += map(head, ("vertices", "points", "algorithm"))
+    heads += [head(method, name) for method in METHODS for name in ("median", "p99", "max")]
+
+    def row(pair: Comparison) -> Iterator[str]:
+        yield from (cell(pair.paper[key], "left") for key in ("robot", "cloud"))
+        yield from (cell(pair.paper[key]) for key in ("vertices", "points", "algorithm"))
+        for own in (pair.paper, pair.fast):
+            for value in (own["median_us"], own["p99_us"], own["max_us"]):
                 text = f"{value:.0f}" if value >= 1000.0 else f"{value:.1f}"
-                yield f"<td><b>{text}</b></td>" if value > CYCLE_US else f"<td>{text}</td>"
-        yield f"<td>{pair.ratio:.1f}</td></tr>"
-    yield "</tbody></table></div>"
+                yield cell(text, bold=value > CYCLE_US)
+        yield cell(f"{pair.ratio:.1f}")
+
+    return table_part(
+        [*heads, head("ratio")],
+        map(row, compare(each.model_dump() for each in cells)),
+        "Medians, 99th percentiles and longest of all calls, in microseconds; bold: longer than "
+        f"the sensors' cycle of {CYCLE_US / 1000.0:g} ms. Ratio: medians, paper over fast.",
+    )
 
 
-def _key(cell: StoredCell) -> tuple[str, int, str, int, int, str]:
-    return (cell.robot, cell.vertices, cell.cloud, cell.points, cell.algorithm, cell.method)
-
-
-def _growth(sweep: Sweep) -> Iterator[str]:
+def _growth(sweep: StoredSweep) -> Iterator[str]:
     yield (
         "<p>time ~ x<sup>b</sup>: b fitted to the medians on logarithmic axes, with its 95 % "
         "interval. Beside it b of the same fit to the paper's cost, every constant 1: Algorithm 1 "
         "by (2), N M log V + N M for each link, Algorithm 2 by (3), log V more: linear in the "
         "points, logarithmic in the vertices.</p>"
     )
-    yield '<div class="scroll"><table><thead><tr><th class="left">robot</th><th>algorithm</th>'
-    yield '<th class="left">method</th><th>with vertices</th><th>formula</th>'
-    yield "<th>with points</th><th>formula</th></tr></thead><tbody>"
-    for row in sweep.summary.growth:
-        yield f'<tr><td class="left">{escape(row.robot)}</td><td>{row.algorithm}</td>'
-        yield f'<td class="left">{escape(row.method)}</td>'
-        for fit in (row.vertices, row.points):
-            yield "<td>-</td><td>-</td>" if fit is None else _exponent(fit)
-        yield "</tr>"
-    yield "</tbody></table></div>"
+    heads = [head("robot", style="left"), head("algorithm"), head("method", style="left")]
+    heads += map(head, ("with vertices", "formula", "with points", "formula"))
+    yield from table_part(
+        heads,
+        (
+            [cell(row.robot, "left"), cell(row.algorithm), cell(row.method, "left"),
+             *_exponent(row.vertices), *_exponent(row.points)]
+            for row in sweep.summary.growth
+        ),
+    )  # fmt: skip
 
 
-def _exponent(fit: Exponent) -> str:
+def _exponent(fit: Exponent | None) -> Iterable[str]:
+    if fit is None:
+        return map(cell, ("-", "-"))
     ends = "" if fit.low is None or fit.high is None else f" ({fit.low:.2f} to {fit.high:.2f})"
-    return f"<td>{fit.exponent:.2f}{ends}</td><td>{fit.formula:.2f}</td>"
+    return map(cell, (f"{fit.exponent:.2f}{ends}", f"{fit.formula:.2f}"))

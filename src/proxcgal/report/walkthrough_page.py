@@ -5,10 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from html import escape
 
-from proxcgal.core.errors import ConfigError
-from proxcgal.report.document import PICTURE_BYTES, document, origin_part, picture
-from proxcgal.report.stored import StoredWalk
-from proxcgal.study.runs.walkthrough import FIGURE, RATINGS, RECORDING, TABLE, TRAJECTORY, lines_of
+from proxcgal.report.document import PICTURE_BYTES, Pictures, code_names, document, origin_part
+from proxcgal.report.stored_results import StoredResults
+from proxcgal.study.runs.walkthrough import (
+    FIGURE,
+    RATINGS,
+    RECORDING,
+    TABLE,
+    TRAJECTORY,
+    walkthrough_lines,
+)
 
 _TAUGHT = (
     "Above: speed of the tool while it is taught at the process's speed and by the hand-guiding "
@@ -33,37 +39,24 @@ _PAPER = {
 }
 
 
-def walk_page(stored: StoredWalk) -> str:
-    """The page of a walk-through: valid HTML, everything inside.
-
-    Raises:
-        ConfigError: a summary of another form.
-    """
-    try:
-        title = f"Walk-through programming: {stored.summary['scenario']}"
-        return document(title, list(_parts(stored)))
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        reason = f"{type(error).__name__}: {error}"
-        raise ConfigError(
-            f"{stored.folder / 'summary.json'}: not the summary of a walk-through: {reason}"
-        ) from None
+def walkthrough_page(stored: StoredResults) -> str:
+    """The page of a walk-through: valid HTML, everything inside."""
+    return document(f"Walk-through programming: {stored.summary['scenario']}", _parts(stored))
 
 
-def _parts(stored: StoredWalk) -> Iterator[str]:
+def _parts(stored: StoredResults) -> Iterator[str]:
     summary = stored.summary
-    if stored.about.description:
-        text = stored.about.description
+    if text := stored.about.description:
         yield f"<p>{escape(text[:1].upper() + text[1:])}.</p>"
-    for line in lines_of(summary):
+    for line in walkthrough_lines(summary):
         tag = "pre" if "\n" in line else "p"
         yield f"<{tag}>{escape(line)}</{tag}>"
-    if summary["trips"]:
-        paper = _PAPER.get(summary["trips"][0]["function"])
-        if paper:
-            yield f"<p>The paper [WT], {escape(paper)}</p>"
-    caption = _TRIPPED if summary["trips"] else _TAUGHT
-    yield picture(stored.folder / FIGURE, caption, PICTURE_BYTES)[0]
-    yield picture(stored.folder / RATINGS, _RATED, PICTURE_BYTES // 4)[0]
+    trips = summary["trips"]
+    if trips and (paper := _PAPER.get(trips[0]["function"])):
+        yield f"<p>The paper [WT], {escape(paper)}</p>"
+    caption = _TRIPPED if trips else _TAUGHT
+    yield Pictures().part(stored.folder / FIGURE, caption)
+    yield Pictures(3 * PICTURE_BYTES // 4).part(stored.folder / RATINGS, _RATED)
     pairs = ", ".join(map(str, summary["monitored_pairs"]))
     yield f"<p>Distance to the operator is monitored of: {escape(pairs)}.</p>"
     for entry in summary["accepted"]:
@@ -74,8 +67,7 @@ def _parts(stored: StoredWalk) -> Iterator[str]:
     )
     there = [name for name in (RECORDING, TABLE, TRAJECTORY) if (stored.folder / name).is_file()]
     if there:
-        names = ", ".join(f"<code>{escape(name)}</code>" for name in there)
-        yield f'<p class="soft">Beside this page: {names}.</p>'
+        yield f'<p class="soft">Beside this page: {code_names(there)}.</p>'
     yield from origin_part(stored.about)
     if stored.settings:
         yield "<h3>Settings</h3>"

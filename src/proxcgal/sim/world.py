@@ -10,14 +10,13 @@ exactly and the scene its paths, so poses are set, and rays and pictures are tak
 from __future__ import annotations
 
 import copy
-import ctypes
 import os
-import sys
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,24 +24,7 @@ from proxcgal.core.errors import SimulationError
 from proxcgal.core.typing import Array, Bools
 from proxcgal.models.surfaces import Surfaces
 from proxcgal.scene.solids import Box, Capsule, Cylinder, Solid, Sphere
-
-
-def _off_screen_library() -> str:
-    """What to draw with where there is no display; "disable" where nothing can."""
-    for backend, library in (("egl", "libEGL.so.1"), ("osmesa", "libOSMesa.so.8")):
-        try:
-            ctypes.CDLL(library)
-        except OSError:
-            continue
-        return backend
-    return "disable"
-
-
-if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("MUJOCO_GL")):
-    os.environ["MUJOCO_GL"] = _off_screen_library()  # read once, by the import
-
-_TOO_LATE = "mujoco" in sys.modules
-import mujoco  # noqa: E402
+from proxcgal.sim import MUJOCO_CAME_FIRST
 
 if TYPE_CHECKING:
     from proxcgal.models.robots import Robot
@@ -273,7 +255,7 @@ class World:
                 self._renderers[size] = mujoco.Renderer(self._model, size[1], size[0])
             except Exception as error:  # each GL backend fails in its own way
                 cure = "install libegl1 and libgl1-mesa-dri, or libosmesa6"
-                if _TOO_LATE:
+                if MUJOCO_CAME_FIRST:
                     cure = "mujoco was imported before proxcgal.sim: import that first"
                 backend = os.environ.get("MUJOCO_GL")
                 raise SimulationError(

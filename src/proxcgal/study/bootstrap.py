@@ -18,43 +18,32 @@ _PARTS = 20
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """A median or mean with its bootstrap interval."""
+    """A median, mean or ratio with its bootstrap interval."""
 
     middle: float
     low: float
     high: float
 
 
-@dataclass(frozen=True, slots=True)
-class RatioInterval:
-    """A ratio of sums with its bootstrap interval; None where the sum below is not above 0."""
-
-    middle: float | None
-    low: float | None
-    high: float | None
-
-
 def ratio_interval(
     above: Sequence[float] | Array,
     below: Sequence[float] | Array,
     seed: int = 0,
-) -> RatioInterval:
+) -> Interval | None:
     """sum(above) / sum(below) over pairs, and its 95 % percentile bootstrap interval.
 
     Resamples whose sum below is not above 0 have no ratio; where more than 1 in 20 of them have
-    none, the sum below may as well be 0, and there is neither ratio nor interval.
+    none, the sum below may as well be 0, and there is neither ratio nor interval: None.
     """
     up, down = np.asarray(above, np.float64), np.asarray(below, np.float64)
     if not len(up) or not down.sum() > 0.0:
-        return RatioInterval(None, None, None)
+        return None
     rows = np.random.default_rng(seed).integers(len(up), size=(RESAMPLES, len(up)))
     sums = up[rows].sum(axis=1), down[rows].sum(axis=1)
     good = sums[1] > 0.0
     if good.mean() < CONFIDENCE:
-        return RatioInterval(None, None, None)
-    tail = 50.0 * (1.0 - CONFIDENCE)
-    low, high = np.percentile(sums[0][good] / sums[1][good], [tail, 100.0 - tail])
-    return RatioInterval(float(up.sum() / down.sum()), float(low), float(high))
+        return None
+    return _percentile_interval(float(up.sum() / down.sum()), sums[0][good] / sums[1][good])
 
 
 def median_interval(values: Sequence[float], seed: int = 0) -> Interval | None:
@@ -79,6 +68,10 @@ def _interval(values: Sequence[float], middle: Any, seed: int) -> Interval | Non
     for part in np.split(middles, _PARTS):  # all at once would take memory
         rows = generator.integers(len(sample), size=(len(part), len(sample)))
         part[:] = middle(sample[rows], axis=1)
+    return _percentile_interval(float(middle(sample)), middles)
+
+
+def _percentile_interval(middle: float, resampled: Array) -> Interval:
     tail = 50.0 * (1.0 - CONFIDENCE)
-    low, high = np.percentile(middles, [tail, 100.0 - tail])
-    return Interval(float(middle(sample)), float(low), float(high))
+    low, high = np.percentile(resampled, [tail, 100.0 - tail])
+    return Interval(middle, float(low), float(high))

@@ -7,21 +7,18 @@ import shutil
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from proxcgal.core.errors import ProxError
 from proxcgal.core.progress import Progress
-
-if TYPE_CHECKING:
-    from proxcgal.study.campaign import Trial
-    from proxcgal.study.jobs import Report
-    from proxcgal.study.workers import Pool
-
-MOVING, STILL = "motion.gif", "motion.png"
-_HALF = ".drawing-"  # begins the name of what is on its way
+from proxcgal.recording.reader import read_recording
+from proxcgal.study.campaign import Trial
+from proxcgal.study.jobs import ShareReport
+from proxcgal.study.motion_picture import DRAWING, MOVING, motion_picture
+from proxcgal.study.trial_simulation import simulate_trial
+from proxcgal.study.workers import Pool
 
 
-def show_moving(trials: Sequence[Trial], folder: Path, pool: Pool, *, quiet: bool) -> None:
+def draw_moving(trials: Sequence[Trial], folder: Path, pool: Pool, *, quiet: bool) -> None:
     """Draws `motion.gif` and one of its frames into a campaign's folder, unless they are there.
 
     A machine that cannot draw off screen gets all the rest.
@@ -32,7 +29,7 @@ def show_moving(trials: Sequence[Trial], folder: Path, pool: Pool, *, quiet: boo
         pool: a worker of this machine draws.
         quiet: no progress on stderr.
     """
-    for half in folder.glob(f"{_HALF}*"):  # of a process that was killed
+    for half in folder.glob(f"{DRAWING}*"):  # of a process that was killed
         shutil.rmtree(half, ignore_errors=True)
     if not trials or (folder / MOVING).is_file():
         return
@@ -43,13 +40,9 @@ def show_moving(trials: Sequence[Trial], folder: Path, pool: Pool, *, quiet: boo
         )  # fmt: skip
 
 
-def _draw(trials: Sequence[Trial], folder: Path, report: Report) -> str:
-    from proxcgal.recording.reader import read_recording
-    from proxcgal.study.motion_picture import motion_picture
-    from proxcgal.study.trials import simulate
-
+def _draw(trials: Sequence[Trial], folder: Path, report: ShareReport) -> str:
     steps = len(trials) + 1
-    with tempfile.TemporaryDirectory(prefix=_HALF, dir=folder) as half:
+    with tempfile.TemporaryDirectory(prefix=DRAWING, dir=folder) as half:
         try:
             recordings = []
             for row, trial in enumerate(trials):
@@ -58,13 +51,13 @@ def _draw(trials: Sequence[Trial], folder: Path, report: Report) -> str:
                 def part(share: float, done: int = row) -> None:
                     report((done + share) / steps)
 
-                log = simulate(trial.scenario, trial.controller, trial.seed, part, recording=path)
+                log = simulate_trial(
+                    trial.scenario, trial.controller, trial.seed, part, recording=path
+                )
                 if log.recording_failure:
                     return f"no {MOVING}: {log.recording_failure}"
                 recordings.append(read_recording(path))
-            motion_picture(recordings, Path(half) / MOVING, Path(half) / STILL)
+            motion_picture(recordings, folder)
         except ProxError as error:
             return f"no {MOVING}: {error}"
-        for name in (MOVING, STILL):
-            (Path(half) / name).replace(folder / name)
     return MOVING

@@ -17,7 +17,7 @@ _alone = threading.Lock()  # MuJoCo's warnings belong to a process: one job at a
 
 
 class Cluster:
-    """A scheduler that somebody else started, and the workers that it has."""
+    """A scheduler that runs already, and its workers."""
 
     def __init__(self, address: str) -> None:
         """Connects.
@@ -26,7 +26,7 @@ class Cluster:
             address: of the scheduler, such as tcp://10.0.0.1:8786.
 
         Raises:
-            ConfigError: nobody answers there, or a worker has other versions than this process.
+            ConfigError: no scheduler answers there, or a worker has other versions.
         """
         try:
             distributed: Any = import_module("distributed")  # 0.5 s; ships half of its types
@@ -36,7 +36,9 @@ class Cluster:
                 "pip install 'proxcgal[cluster]'"
             ) from None
         for name in ("distributed", "distributed.client"):
-            logging.getLogger(name).setLevel(logging.CRITICAL)  # what it means, we tell in a line
+            logging.getLogger(name).setLevel(
+                logging.CRITICAL
+            )  # its errors are reported in one line here
         self.address = address
         #: What a job ends as that workers died with, whether they ran it or had it in their queue.
         self.killed: type[Exception] = distributed.KilledWorker
@@ -65,7 +67,7 @@ class Cluster:
         return int(getattr(killed, "allowed_failures", 0)) + 1
 
     def _compare(self) -> None:
-        """Workers that came later are not asked; each is another machine's own business."""
+        """Compares the versions of the workers that are there; later ones are not checked."""
         if not self._client.scheduler_info()["workers"]:
             raise ConfigError(
                 f"--cluster {self.address}: has no workers; start some with "
@@ -80,18 +82,18 @@ class Cluster:
             ) from None
         own = versions()
         apart = [
-            f"--cluster {self.address}: worker {worker} has {name} {told.get(name)}, "
+            f"--cluster {self.address}: worker {worker} has {name} {theirs.get(name)}, "
             f"this machine {own.get(name)}: all must be the same"
-            for worker, told in sorted(found.items())
-            for name in sorted((own.keys() | told.keys()) - {"machine", "python"})
-            if told.get(name) != own.get(name)
+            for worker, theirs in sorted(found.items())
+            for name in sorted((own.keys() | theirs.keys()) - {"machine", "python"})
+            if theirs.get(name) != own.get(name)
         ]
         if apart:
             raise ConfigError("\n".join(apart))
 
 
 def work_far(job: Any) -> Any:
-    """One job on a worker of the cluster; nobody there is told the share done."""
+    """One job on a worker of the cluster; its share done is not reported."""
     with _alone:
         return job(lambda _: None)
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
@@ -14,14 +14,8 @@ from matplotlib.patches import Patch
 from proxcgal.core.transforms import placed
 from proxcgal.core.typing import Array
 from proxcgal.evaluation.blind_volume import REACH_M, BlindVolume, distances, last_seen
-from proxcgal.study.figures import DPI, GREY, LEGEND
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from matplotlib.axes import Axes
-
-    from proxcgal.scenario.setup import Setup
+from proxcgal.scenario.setup import Setup
+from proxcgal.study.plotting import DOTTED, GREY, legend_below, new_figure, tidy_axes
 
 _STEP_M = 0.025  # between the points of a section
 _ARM = "#6B6B6B"
@@ -51,9 +45,7 @@ def coverage_figure(
     memory_s = setup.scenario.controller.memory.memory_s
     q = postures[-1]
     tool_W = np.asarray(setup.robot.tool_pose(q))[:3, 3]
-    figure = Figure(figsize=(12.0, 4.6), dpi=DPI, layout="constrained")
-    FigureCanvasAgg(figure)
-    figure.suptitle(title, fontsize=12, fontweight="bold")
+    figure = new_figure(12.0, 4.6, title)
     axes = figure.subplots(1, 3, width_ratios=(1.25, 1.25, 1.0))
     level = float(tool_W[2] if nearest_W is None else nearest_W[2])
     bearing = float(np.arctan2(*(tool_W if nearest_W is None else nearest_W)[1::-1]))
@@ -69,8 +61,7 @@ def coverage_figure(
         if nearest_W is not None:
             at = nearest_W - origin
             ax.plot(at @ right, at @ up, marker="x", color="black", markersize=7, mew=1.8)
-        ax.set_xlabel(right_name, fontsize=10)
-        ax.set_ylabel(up_name, fontsize=10)
+        ax.set(xlabel=right_name, ylabel=up_name)
         ax.set_title(name, loc="left", fontsize=10)
     _shares(axes[2], volume, memory_s)
     names = ("in view", f"seen within {memory_s:g} s", "seen before", "never seen")
@@ -80,10 +71,8 @@ def coverage_figure(
         handles.append(
             axes[0].plot([], [], "x", color="black", mew=1.8, label="closest point of the scene")[0]
         )
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), **LEGEND)
-    for ax in axes:
-        ax.tick_params(labelsize=9)
-        ax.spines[["top", "right"]].set_visible(False)
+    legend_below(figure, handles)
+    tidy_axes(*axes)
     for ax in axes[:2]:
         ax.locator_params(axis="x", nbins=6)
     return figure
@@ -128,13 +117,15 @@ def _shares(ax: Axes, volume: BlindVolume, memory_s: float) -> None:
     times = np.linspace(0.0, max(2.0 * memory_s, 1.0), 81)
     shares = [100.0 * volume.share_unseen_for(time) for time in times]
     ax.step(times, shares, where="post", color="#0072B2", linewidth=1.6)
-    ax.axvline(memory_s, color=GREY, linewidth=1.0, linestyle=(0, (1, 1.5)))
+    ax.axvline(memory_s, color=GREY, linewidth=1.0, linestyle=DOTTED)
     ax.annotate(
         "memory", (memory_s, 97.0), xytext=(4, 0), textcoords="offset points", va="top", fontsize=9,
         color=GREY,
     )  # fmt: skip
-    ax.set_ylim(0.0, 100.0)
-    ax.set_xlim(0.0, float(times[-1]))
-    ax.set_xlabel("not seen for more than [s]", fontsize=10)
-    ax.set_ylabel(f"share of the volume within {REACH_M:g} m [%]", fontsize=10)
+    ax.set(
+        ylim=(0.0, 100.0),
+        xlim=(0.0, float(times[-1])),
+        xlabel="not seen for more than [s]",
+        ylabel=f"share of the volume within {REACH_M:g} m [%]",
+    )
     ax.set_title("(c)", loc="left", fontsize=10)

@@ -1,4 +1,4 @@
-"""What a job and its worker process tell each other: the share done, and the word to stop."""
+"""Messages between a job and its master process: the share done, and the request to stop."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from typing import Any
 
 import numpy as np
 
-Report = Callable[[float], None]  # called by a job with its share done, 0 to 1
-Job = Callable[[Report], Any]  # picklable; does the work
+ShareReport = Callable[[float], None]  # called by a job with its share done, 0 to 1
+Job = Callable[[ShareReport], Any]  # picklable; does the work
 
 WATCH_S = 1.0  # [s] between looks at whether the master is alive
 _STOP_SLOT = 0
 
 
 class StoppedError(Exception):
-    """Raised inside a job that was told to stop."""
+    """Raised inside a job that has to stop."""
 
 
-class Progress:
-    """Shares of all jobs done, and the word to stop, in a file that every process maps.
+class SharedProgress:
+    """Shares of all jobs done, and the request to stop, in a file that every process maps.
 
     A mapped file needs no server process and no queue, and costs a job nothing.
     """
@@ -44,11 +44,11 @@ class Progress:
             raise StoppedError
 
     def note(self, job: int, share: float) -> None:
-        """Notes the share done, for those who are not to stop."""
+        """Notes the share done; never raises."""
         self._shares[1 + job] = share
 
     def stop(self) -> None:
-        """Tells all jobs to stop at their next report."""
+        """Requests all jobs to stop at their next report."""
         self._shares[_STOP_SLOT] = 1.0
 
     def shares(self) -> list[float]:
@@ -58,7 +58,7 @@ class Progress:
 
 def work(job: Job, path: str, row: int) -> Any:
     """One job in a worker process."""
-    progress = Progress(Path(path), 0)
+    progress = SharedProgress(Path(path), 0)
 
     def report(share: float) -> None:
         progress.report(row, share)
@@ -73,7 +73,7 @@ def end_with(master: int) -> None:
     def watch() -> None:
         while os.getppid() == master:
             clock.sleep(WATCH_S)
-        os._exit(1)  # busy or not: nobody is there to take a result
+        os._exit(1)  # busy or not: no process is left to take a result
 
     threading.Thread(target=watch, daemon=True).start()
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bisect
+import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -17,8 +18,10 @@ from proxcgal.scenario.loading import HriScenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.scene.solids import Box
 from proxcgal.sim.world import Camera, World
-from proxcgal.study.figures import COLOURS, GREY, NAMES
+from proxcgal.study.plotting import CONTROLLER_COLOURS, CONTROLLER_NAMES, GREY
 
+MOVING, STILL = "motion.gif", "motion.png"
+DRAWING = ".drawing-"  # begins the name of a folder of unfinished files
 FPS = 8.0
 FRAMES = 50  # of the run; the last one is then held
 HELD = 8
@@ -28,27 +31,27 @@ STRIP = 48  # [px] of text below it
 
 def motion_picture(
     recordings: Sequence[Recording],
-    path: Path,
-    still: Path,
+    folder: Path,
     on_progress: Callable[[float], None] | None = None,
 ) -> None:
-    """Writes a GIF of one scene under several controllers, side by side.
+    """Writes a GIF of one scene under several controllers, side by side, and one frame of it.
+
+    The frame, a PNG, is the last one; beside a person, the moment of the least true distance of all
+    runs. Both files are whole, or not there.
 
     Args:
         recordings: of one scenario; their ticks are repeated, which gives the clouds.
-        path: where to.
-        still: where its last frame goes, as a PNG; beside a person, the moment of the least true
-            distance of all runs.
-        on_progress: told the share done, 0 to 1.
+        folder: gets `motion.gif` and `motion.png`.
+        on_progress: called with the share done, 0 to 1.
 
     Raises:
         SimulationError: there is no way to draw off screen.
     """
     setup = Setup.of(recordings[0].settings.scenario)
     times = np.linspace(0.0, max(r.ticks[-1].inputs.time for r in recordings), FRAMES).tolist()
-    telling, nearest = _telling(setup, recordings)
-    stills = bisect.bisect_left(times, telling)  # where the still's moment stands among them
-    times.insert(stills, telling)
+    time_shown, nearest = _time_shown(setup, recordings)
+    stills = bisect.bisect_left(times, time_shown)  # where the still's moment stands among them
+    times.insert(stills, time_shown)
     seen = [recorded_moments(recording, times) for recording in recordings]
     camera = camera_for(setup)
     world = World(setup.robot, setup.scenario.drawn(), setup.scenario.floor, setup.scene.names)
@@ -65,11 +68,14 @@ def motion_picture(
                 on_progress((row + 1) / len(times))
     finally:
         world.close()
-    frames.pop(stills).save(still, optimize=True)
-    write_gif(frames + frames[-1:] * HELD, path, FPS)
+    with tempfile.TemporaryDirectory(prefix=DRAWING, dir=folder) as half:
+        frames.pop(stills).save(Path(half) / STILL, optimize=True)
+        write_gif(frames + frames[-1:] * HELD, Path(half) / MOVING, FPS)
+        for name in (MOVING, STILL):
+            (Path(half) / name).replace(folder / name)
 
 
-def _telling(setup: Setup, recordings: Sequence[Recording]) -> tuple[float, int]:
+def _time_shown(setup: Setup, recordings: Sequence[Recording]) -> tuple[float, int]:
     """The moment [s] that shows most, and which run came nearest then, -1 where none is named.
 
     The end; beside a person, who comes and in the end is gone, the least distance of all runs.
@@ -129,14 +135,16 @@ def _pane(
     picture = Image.new("RGB", (PANE[0], PANE[1] + STRIP), "white")
     picture.paste(Image.fromarray(draw(world, snapshot, PANE, camera)), (0, 0))
     pen = ImageDraw.Draw(picture)
-    colour = COLOURS.get(controller, "black")
+    colour = CONTROLLER_COLOURS.get(controller, "black")
     pen.rectangle((0, PANE[1], PANE[0], PANE[1] + 3), fill=colour)
     top = PANE[1] + 8
-    pen.text((10, top), NAMES.get(controller, controller), font=_font(bold=True), fill=colour)
+    pen.text(
+        (10, top), CONTROLLER_NAMES.get(controller, controller), font=_font(bold=True), fill=colour
+    )
     true = 1000.0 * snapshot.tick.truth.distance
     if isinstance(scenario, HriScenario):
-        whose = f"{scenario.name}, {scenario.operator.who}"
-        pen.text((PANE[0] - 10, top), whose, font=_font(), fill=GREY, anchor="ra")
+        who = f"{scenario.name}, {scenario.operator.who}"
+        pen.text((PANE[0] - 10, top), who, font=_font(), fill=GREY, anchor="ra")
     text = f"t = {snapshot.tick.inputs.time:.1f} s    true distance {true:.0f} mm{note}"
     pen.text((10, top + 18), text, font=_font(), fill="black")
     return picture

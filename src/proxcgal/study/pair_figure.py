@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from proxcgal import _core
 from proxcgal.core.typing import Array
-from proxcgal.study.figures import DPI
-
-if TYPE_CHECKING:
-    from proxcgal.models.robots import Robot
+from proxcgal.models.robots import Robot
+from proxcgal.study.plotting import new_figure
 
 PAIR_COLOUR = "#C80000"
 ROBOT_SPACING = 0.018  # [m] about, between the points that stand for the arm
@@ -53,9 +50,7 @@ def pair_figure(
         bearing: from where it is looked at, counter-clockwise from x, seen from above [rad].
     """
     columns, height = len(rows[0]), 3.9 * len(rows) + 0.3
-    figure = Figure(figsize=(3.8 * columns, height), dpi=DPI)
-    FigureCanvasAgg(figure)
-    figure.suptitle(title, fontsize=12, fontweight="bold", y=1.0 - 0.1 / height)
+    figure = new_figure(3.8 * columns, height, title, layout=None, y=1.0 - 0.1 / height)
     figure.subplots_adjust(
         left=0.0, right=0.96, bottom=0.25 / height, top=1.0 - 0.8 / height, wspace=0.04, hspace=0.16
     )
@@ -66,13 +61,8 @@ def pair_figure(
             _draw_pair(ax, view, everything, bearing)
             letter = "abcdefgh"[i * columns + j]
             text = f"{view.link}, {1000 * view.distance:.0f} mm"
-            ax.text2D(
-                0.5, 1.05, f"({letter}) {view.title}", transform=ax.transAxes, ha="center",
-                fontsize=10,
-            )  # fmt: skip
-            ax.text2D(
-                0.5, 0.99, text, transform=ax.transAxes, ha="center", fontsize=9, color=PAIR_COLOUR
-            )
+            caption_3d(ax, 1.05, f"({letter}) {view.title}")
+            caption_3d(ax, 0.99, text, fontsize=9, color=PAIR_COLOUR)
     return figure
 
 
@@ -85,10 +75,10 @@ def _draw_pair(ax: Any, view: PairView, everything: Array, bearing: float) -> No
         ax.scatter(*view.context_W.T, s=0.8, color="#D4D4D4", zorder=2, **plain)
     size, colour, alpha = (1.6, "#606060", 0.6) if len(view.robot_W) > 200 else (14, "black", 1.0)
     ax.scatter(*view.robot_W.T, s=size, color=colour, alpha=alpha, zorder=3, **plain)
-    pair_arrow(ax, view.nearest_W, view.control_W)
+    draw_pair_arrow(ax, view.nearest_W, view.control_W)
 
 
-def pair_arrow(ax: Any, obstacle_W: Array, surface_W: Array) -> None:
+def draw_pair_arrow(ax: Any, obstacle_W: Array, surface_W: Array) -> None:
     """The closest pair as an arrow from the obstacle's point to the robot's, (3,) each [m]."""
     apart_W = surface_W - obstacle_W
     ax.quiver(
@@ -112,6 +102,11 @@ def frame_3d(ax: Any, everything_W: Array, bearing: float) -> None:
     for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
         axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
         axis._axinfo["grid"].update(color="#E4E4E4", linewidth=0.5)
+
+
+def caption_3d(ax: Any, height: float, text: str, **style: Any) -> None:
+    """A line of text above a panel, at that share of its height."""
+    ax.text2D(0.5, height, text, transform=ax.transAxes, ha="center", **{"fontsize": 10} | style)
 
 
 def whole_body_view(

@@ -1,4 +1,4 @@
-"""Controllers beside one another on the same draws."""
+"""Controllers beside one another on the same draws, or with the same subjects."""
 
 from __future__ import annotations
 
@@ -11,36 +11,46 @@ import polars as pl
 from proxcgal.core.typing import Array
 from proxcgal.evaluation.metrics import NOTHING_M
 
-Ends = Mapping[str, Mapping[int, float]]
+Distances = Mapping[str, Mapping[int, float]]  # [m] by controller, then by draw or subject
 
 
 @dataclass(frozen=True, slots=True)
 class Pairs:
-    """True distances at the end of the draws that both controllers ended, (n,) each [m]."""
+    """Distances of what both controllers met, (n,) each [m]."""
 
     one: Array
     other: Array
 
     @property
     def apart_mm(self) -> list[float]:
-        """How much farther away the first ends [mm]."""
+        """How much farther away the first is [mm]."""
         return [float(apart) for apart in 1000.0 * (self.one - self.other)]
 
 
-def ends_of(table: pl.DataFrame, measure: str = "true_final_m") -> Ends:
-    """True distance at the end, or another measure of it, by controller and draw [m].
+def by_controller(table: pl.DataFrame, measure: str, each: str) -> Distances:
+    """One measure of a campaign's trials.
 
-    Trials that failed, or have nothing to be distant from, are left out.
+    Args:
+        table: of one scene's trials.
+        measure: column of a distance [m].
+        each: column of the draw or subject.
     """
-    done = table.filter(pl.col("error").is_null(), pl.col(measure) < NOTHING_M)
     return {
-        str(name): dict(part.select("draw", measure).iter_rows())
-        for (name,), part in done.group_by(["controller"], maintain_order=True)
+        str(name): dict(part.select(each, measure).iter_rows())
+        for (name,), part in table.group_by(["controller"], maintain_order=True)
     }
 
 
-def pairs(ends: Ends, one: str, other: str) -> Pairs:
-    """Both controllers' ends in the draws that both have."""
-    first, second = ends.get(one, {}), ends.get(other, {})
-    draws = sorted(first.keys() & second.keys())
-    return Pairs(np.array([first[d] for d in draws]), np.array([second[d] for d in draws]))
+def draw_distances(table: pl.DataFrame, measure: str = "true_final_m") -> Distances:
+    """One measure of the draws; trials that failed, or saw nothing to be distant from, left out."""
+    done = table.filter(pl.col("error").is_null(), pl.col(measure) < NOTHING_M)
+    return by_controller(done, measure, "draw")
+
+
+def pairs(distances: Distances, one: str, other: str) -> Pairs:
+    """Both controllers' distances, of the draws or subjects that both have."""
+    first, second = distances.get(one, {}), distances.get(other, {})
+    both = sorted(first.keys() & second.keys())
+    return Pairs(
+        np.array([first[each] for each in both]), np.array([second[each] for each in both])
+    )

@@ -1,4 +1,4 @@
-"""Jobs side by side: worker processes with progress, that end cleanly when told to, or a cluster.
+"""Jobs side by side: worker processes with progress, that end cleanly on request, or a cluster.
 
 Local workers are joblib's (loky), which come to life again when one was killed.
 """
@@ -20,10 +20,12 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from joblib.externals.loky import ProcessPoolExecutor
+
 from proxcgal.core.closing import Closing
 from proxcgal.core.errors import SimulationError
 from proxcgal.study.cluster import Cluster, work_far
-from proxcgal.study.jobs import Job, Progress, end_with, interrupts_blocked, work
+from proxcgal.study.jobs import Job, SharedProgress, end_with, interrupts_blocked, work
 
 POLL_S = 0.1  # [s] between looks at the progress
 
@@ -31,8 +33,9 @@ POLL_S = 0.1  # [s] between looks at the progress
 class Pool(Closing):
     """Runs jobs on worker processes, on a cluster, or here when one worker is enough.
 
-    Ctrl-C reaches this process only: workers have it blocked, are told through the progress file,
-    close what they write, and are waited for. Workers whose master is gone end by themselves.
+    Ctrl-C reaches this process only: workers have it blocked, read the request to stop from the
+    progress file, close what they write, and are waited for. Workers whose master is gone end
+    by themselves.
     """
 
     def __init__(self, workers: int, cluster: str | None = None) -> None:
@@ -75,7 +78,7 @@ class Pool(Closing):
                 died with it; gives its result.
 
         Raises:
-            SimulationError: a worker died (killed, or out of memory) and nobody asked `on_lost`.
+            SimulationError: a worker died (killed, or out of memory) and there is no `on_lost`.
             Exception: the first that a job raised; the others are stopped.
         """
         with tempfile.TemporaryDirectory(prefix="proxcgal-") as folder:
@@ -106,8 +109,6 @@ class _Worker:
         """Gives it a job, as `work` takes it, when it has none."""
         while True:
             if self._process is None:
-                from joblib.externals.loky import ProcessPoolExecutor  # 0.1 s
-
                 self._process = ProcessPoolExecutor(
                     1, initializer=end_with, initargs=(os.getpid(),)
                 )
@@ -139,7 +140,7 @@ class _Run:
     ) -> None:
         self._jobs = jobs
         self._path = path
-        self._progress = Progress(path, len(jobs))
+        self._progress = SharedProgress(path, len(jobs))
         self._tell, self._done, self._lost = tell, done, lost
         self._running: dict[Future[Any], int] = {}
         self.results: list[Any] = [None] * len(jobs)
@@ -222,7 +223,7 @@ class _Run:
 
     @contextmanager
     def _stopped(self) -> Iterator[None]:
-        """Whatever goes wrong: all jobs are told to stop, and those on this machine waited for.
+        """Whatever goes wrong: all jobs are requested to stop, those on this machine waited for.
 
         What ended with a result all the same is taken.
         """
@@ -234,7 +235,7 @@ class _Run:
                 future.cancel()
             left = {f: row for f, row in self._running.items() if not f.cancelled()}
             wait(left)
-            with suppress(Exception):  # what went wrong first is told
+            with suppress(Exception):  # what went wrong first is raised
                 for future, row in left.items():
                     if future.exception() is None:
                         self._take(row, future.result())

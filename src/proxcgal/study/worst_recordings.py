@@ -6,23 +6,23 @@ import functools
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from proxcgal.core.errors import RecordingError
 from proxcgal.core.progress import Progress
 from proxcgal.core.versions import versions
-from proxcgal.study.campaign import told
-from proxcgal.study.jobs import Report, StoppedError
+from proxcgal.recording.reader import read_recording
+from proxcgal.recording.writer import RecordedTicks
+from proxcgal.study.campaign import Ended, Trial
+from proxcgal.study.execution import failure_text
+from proxcgal.study.jobs import ShareReport, StoppedError
+from proxcgal.study.trial_simulation import simulate_trial
 from proxcgal.study.workers import Pool
-
-if TYPE_CHECKING:
-    from proxcgal.recording.writer import RecordedTicks
-    from proxcgal.study.campaign import Ended, Trial
 
 FOLDER = "recordings"
 
 
-def keep_worst(
+def record_worst(
     chosen: Sequence[Ended], folder: Path, ticks: RecordedTicks, pool: Pool, *, quiet: bool
 ) -> list[dict[str, Any]]:
     """Records these trials, unless they are there; recordings of other trials are removed.
@@ -64,8 +64,6 @@ def _entry(trial: Trial, name: str, error: str | None) -> dict[str, Any]:
 
 def _there(path: Path, trial: Trial, ticks: RecordedTicks) -> bool:
     """Is the trial's recording there, whole, of these ticks and this build?"""
-    from proxcgal.recording.reader import read_recording
-
     try:
         recording = read_recording(path)
     except RecordingError:
@@ -93,17 +91,17 @@ def _lost(_: int, deaths: int) -> str:
     return f"its worker process died, {deaths} times (out of memory?)"
 
 
-def _record(trial: Trial, path: Path, ticks: RecordedTicks, report: Report) -> dict[str, Any] | str:
-    """Records one trial, in whichever process; the file is whole, or not there and the error told.
+def _record(
+    trial: Trial, path: Path, ticks: RecordedTicks, report: ShareReport
+) -> dict[str, Any] | str:
+    """Records one trial, in whichever process; the file is whole, or there is none.
 
     Returns:
         The run's numbers, or what went wrong.
     """
-    from proxcgal.study.trials import simulate
-
     half = path.with_name(f".{path.name}")
     try:
-        log = simulate(
+        log = simulate_trial(
             trial.scenario, trial.controller, trial.seed, report, recording=half, ticks=ticks,
             robot_digest=trial.robot_digest,
         )  # fmt: skip
@@ -113,7 +111,7 @@ def _record(trial: Trial, path: Path, ticks: RecordedTicks, report: Report) -> d
     except StoppedError:
         raise
     except Exception as problem:
-        return told(problem)
+        return failure_text(problem)
     finally:
         half.unlink(missing_ok=True)
     numbers: dict[str, Any] = log.summary()

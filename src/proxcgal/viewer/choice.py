@@ -1,4 +1,4 @@
-"""What a page may choose: controller, robot, meshes, noise, and three numbers of the law."""
+"""Choices of a page: controller, robot, meshes, noise, and three of the controller's settings."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Choice:
         self._check(scenario)
         changed = scenario
         if self.robot != scenario.robot:
-            other = cast()[self.robot]
+            other = scenes_by_robot()[self.robot]
             kept = ("robot", "q0", "goal", "skin", "limits", "package_dirs")
             changed = changed.model_copy(update={name: getattr(other, name) for name in kept})
         if not self.noise:
@@ -96,7 +96,7 @@ class Choice:
 
 def robots(scenario: Scenario) -> tuple[str, ...]:
     """The robots that may stand in this scene, its own first."""
-    return tuple(dict.fromkeys([scenario.robot, *cast()]))
+    return tuple(dict.fromkeys([scenario.robot, *scenes_by_robot()]))
 
 
 def resolutions(scenario: Scenario) -> tuple[int, ...]:
@@ -104,7 +104,7 @@ def resolutions(scenario: Scenario) -> tuple[int, ...]:
     return tuple(sorted({scenario.vertices_per_link, *RESOLUTIONS}))
 
 
-def cast() -> dict[str, Scenario]:
+def scenes_by_robot() -> dict[str, Scenario]:
     """For each robot, the first built-in static scene that brings sensors for it."""
     found: dict[str, Scenario] = {}
     for name in list_scenarios():

@@ -1,4 +1,4 @@
-"""What a page may say: small messages of known kinds, every value looked at."""
+"""Messages that a page may send to viser: small, of known kinds, every value checked."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import msgspec
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Bounds:
-    """What a page may ask of us."""
+class ClientBounds:
+    """Bounds of what a client may send."""
 
     viewers: int = 16  #: pages at once
     message_bytes: int = 16_384
@@ -22,14 +22,14 @@ class Bounds:
     farthest: float = 1000.0  #: of any number in a pose [m]
 
 
-class Message(NamedTuple):
-    """One that a page may send, as far as its form goes."""
+class ClientMessage(NamedTuple):
+    """A message whose form is allowed."""
 
     kind: str
     fields: dict[str, Any]
 
 
-def understood(raw: object, bounds: Bounds) -> Message | None:
+def parse_message(raw: object, bounds: ClientBounds) -> ClientMessage | None:
     """The message in these bytes; None where it is none that a page needs."""
     if not isinstance(raw, bytes) or len(raw) > bounds.message_bytes:
         return None
@@ -44,7 +44,7 @@ def understood(raw: object, bounds: Bounds) -> Message | None:
         return None
     if not all(checks[name](value, bounds) for name, value in content.items()):
         return None
-    return Message(kind, content)
+    return ClientMessage(kind, content)
 
 
 def switch(value: object) -> bool:
@@ -65,11 +65,11 @@ def between(low: float, high: float) -> Callable[[object], bool]:
     )  # fmt: skip
 
 
-def _text(value: object, bounds: Bounds) -> bool:
+def _text(value: object, bounds: ClientBounds) -> bool:
     return isinstance(value, str) and len(value) <= bounds.longest_text
 
 
-def _number(value: object, bounds: Bounds) -> bool:
+def _number(value: object, bounds: ClientBounds) -> bool:
     return (
         isinstance(value, int | float)
         and not isinstance(value, bool)
@@ -78,8 +78,8 @@ def _number(value: object, bounds: Bounds) -> bool:
     )
 
 
-def _vector(length: int) -> Callable[[object, Bounds], bool]:
-    def check(value: object, bounds: Bounds) -> bool:
+def _vector(length: int) -> Callable[[object, ClientBounds], bool]:
+    def check(value: object, bounds: ClientBounds) -> bool:
         return (
             isinstance(value, list)
             and len(value) == length
@@ -89,20 +89,20 @@ def _vector(length: int) -> Callable[[object, Bounds], bool]:
     return check
 
 
-def _quaternion(value: object, bounds: Bounds) -> bool:
+def _quaternion(value: object, bounds: ClientBounds) -> bool:
     if not _vector(4)(value, bounds):
         return False
     assert isinstance(value, list)
     return 0.9 < float(sum(each * each for each in value)) < 1.1
 
 
-def _updates(value: object, bounds: Bounds) -> bool:
+def _updates(value: object, bounds: ClientBounds) -> bool:
     """A control's value, and nothing else of it."""
     return isinstance(value, dict) and value.keys() == {"value"}
 
 
 _POSE = {"wxyz": _quaternion, "position": _vector(3)}
-_FIELDS: Mapping[str, Mapping[str, Callable[[Any, Bounds], bool]]] = {
+_FIELDS: Mapping[str, Mapping[str, Callable[[Any, ClientBounds], bool]]] = {
     "ViewerCameraMessage": {
         **_POSE, "fov": _number, "near": _number, "far": _number, "image_height": _number,
         "image_width": _number, "look_at": _vector(3), "up_direction": _vector(3),

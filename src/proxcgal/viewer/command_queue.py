@@ -1,4 +1,4 @@
-"""What pages want, collected until the simulation is told: the last word on each thing counts."""
+"""Commands of pages, collected until they are sent: the latest value per key counts."""
 
 from __future__ import annotations
 
@@ -15,34 +15,34 @@ ROOM = np.array([[-5.0, -5.0, -1.5], [5.0, 5.0, 4.0]])
 
 
 class CommandQueue:
-    """Any thread may put something on it."""
+    """Keeps only the latest value per key; any thread may put values."""
 
     def __init__(self) -> None:
         """Empty."""
         self._lock = threading.Lock()
-        self._wanted: dict[str, Any] = {}
-        self._hands: dict[str, Array] = {}
+        self._fields: dict[str, Any] = {}
+        self._moves: dict[str, Array] = {}
 
-    def want(self, **wanted: Any) -> None:
-        """Fields of `Wishes`; `steps` add up."""
+    def put(self, **fields: Any) -> None:
+        """Sets fields of the next `Request`; `steps` add up."""
         with self._lock:
-            wanted["steps"] = wanted.get("steps", 0) + self._wanted.get("steps", 0)
-            self._wanted |= wanted
-            if wanted.get("release") or wanted.get("reset") or wanted.get("anew"):
-                self._hands.clear()
+            fields["steps"] = fields.get("steps", 0) + self._fields.get("steps", 0)
+            self._fields |= fields
+            if fields.get("release") or fields.get("reset") or fields.get("restart"):
+                self._moves.clear()
 
     def move(self, name: str, T_WO: Array) -> None:
-        """Where a solid is to go, within the room."""
+        """Sets where a solid is to go, (4, 4) T_WO, within the room."""
         pose = np.array(T_WO)
         pose[:3, 3] = np.clip(pose[:3, 3], *ROOM)
         with self._lock:
-            self._hands[name] = pose
+            self._moves[name] = pose
 
     def take(self) -> Request | None:
-        """All that lies here; None where nothing does."""
+        """Empties the queue; None where it is empty."""
         with self._lock:
-            if not self._wanted and not self._hands:
+            if not self._fields and not self._moves:
                 return None
-            request = Request(**self._wanted, hands=tuple(self._hands.items()))
-            self._wanted, self._hands = {}, {}
+            request = Request(**self._fields, moves=tuple(self._moves.items()))
+            self._fields, self._moves = {}, {}
             return request

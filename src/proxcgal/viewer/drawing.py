@@ -1,4 +1,4 @@
-"""Draws a stage and its moments with viser: the same for the live page, a replay and a report."""
+"""Draws a scene model and its moments with viser, for the live page, a replay and a report."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Drawing:
     def __init__(
         self, scene: viser.SceneApi, model: SceneModel, *, name: str = "", ghost: bool = False
     ) -> None:
-        """Adds them, at the stage's start.
+        """Adds them, where they are at the start.
 
         Args:
             scene: of the server.
@@ -197,8 +197,8 @@ def pose_parts(T_WO: Array) -> tuple[Array, Array]:
     return np.asarray(rotation.wxyz, np.float64), T_WO[:3, 3].copy()
 
 
-def furnish(server: viser.ViserServer, model: SceneModel) -> None:
-    """Light, floor and the first look: light enough for a renderer in software."""
+def add_surroundings(server: viser.ViserServer, model: SceneModel) -> None:
+    """Light, floor and initial camera, cheap enough for a renderer in software."""
     scene = server.scene
     scene.set_up_direction("+z")
     scene.configure_environment_map(hdri=None)  # no texture
@@ -213,13 +213,13 @@ def furnish(server: viser.ViserServer, model: SceneModel) -> None:
     scene.add_grid(
         "/floor", width=4.0, height=4.0, plane="xy", cell_size=0.25, section_size=1.0,
         cell_color=(226, 229, 233), section_color=(190, 196, 204),
-        position=(0.0, 0.0, floor(model)),
+        position=(0.0, 0.0, floor_height(model)),
     )  # fmt: skip
-    look(server, model)
+    set_initial_camera(server, model)
 
 
-def floor(model: SceneModel) -> float:
-    """Where somebody stands, or what stands lower than the arm's base; else that base [m]."""
+def floor_height(model: SceneModel) -> float:
+    """Height of the lowest solid that stands below the arm's base; else of that base, 0 [m]."""
     lowest = (
         float(T_WO[2, 3] - np.abs(T_WO[2, :3]) @ solid.extent)
         for T_WO, solid in zip(model.solids_W, model.solids, strict=True)
@@ -227,16 +227,16 @@ def floor(model: SceneModel) -> float:
     return min(0.0, *lowest, 0.0)
 
 
-def look(server: viser.ViserServer, model: SceneModel) -> None:
+def set_initial_camera(server: viser.ViserServer, model: SceneModel) -> None:
     """Where a page begins to look from: beside the arm and its nearest solid."""
-    position, target = viewpoint(model)
+    position, target = initial_viewpoint(model)
     server.initial_camera.position = tuple(position)
     server.initial_camera.look_at = tuple(target)
     server.initial_camera.up = (0.0, 0.0, 1.0)
     server.initial_camera.fov = 0.75
 
 
-def viewpoint(model: SceneModel) -> tuple[Array, Array]:
+def initial_viewpoint(model: SceneModel) -> tuple[Array, Array]:
     """Camera position and what it looks at, (3,) each [m]."""
     centers = [T_WO[:3, 3] for T_WO in model.solids_W]
     near = min(centers, key=lambda c: float(np.linalg.norm(c - model.tool_W)), default=model.tool_W)

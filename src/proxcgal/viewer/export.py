@@ -10,21 +10,21 @@ from pathlib import Path
 import viser
 
 from proxcgal.sim.moment import Moment
-from proxcgal.viewer.access import NOBODY, close, serve
-from proxcgal.viewer.client_messages import Bounds
-from proxcgal.viewer.drawing import Drawing, furnish
+from proxcgal.viewer.client_messages import ClientBounds
+from proxcgal.viewer.drawing import Drawing, add_surroundings
+from proxcgal.viewer.page_server import served_page
 from proxcgal.viewer.scene_model import SceneModel
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Played:
+class ArmMotion:
     """One arm's moments, in the order of their time."""
 
     model: SceneModel
     moments: Sequence[Moment]
 
 
-def exported(first: Played, ghosts: Sequence[Played] = ()) -> bytes:
+def exported_scene(first: ArmMotion, ghosts: Sequence[ArmMotion] = ()) -> bytes:
     """The scene and how it moves, in real time.
 
     Args:
@@ -35,9 +35,9 @@ def exported(first: Played, ghosts: Sequence[Played] = ()) -> bytes:
     Returns:
         What viser's client plays (zstd inside).
     """
-    server, _ = serve("127.0.0.1", 0, label="", bounds=Bounds(viewers=NOBODY))
-    try:
-        furnish(server, first.model)
+    alone = ClientBounds(viewers=0)  # no page looks on
+    with served_page("127.0.0.1", 0, label="", bounds=alone) as (server, _):
+        add_surroundings(server, first.model)
         drawings = [Drawing(server.scene, first.model)]
         drawings += [
             Drawing(server.scene, ghost.model, name=f"/ghost{row}", ghost=True)
@@ -52,10 +52,8 @@ def exported(first: Played, ghosts: Sequence[Played] = ()) -> bytes:
             for drawing, moment in zip(drawings, now, strict=True):
                 drawing.show(moment)
         return recorded.serialize()
-    finally:
-        close(server)
 
 
-def player() -> str:
+def viser_client() -> str:
     """Viser's client: one HTML file that fetches nothing."""
     return (Path(viser.__file__).parent / "client" / "build" / "index.html").read_text()

@@ -1,4 +1,4 @@
-"""The live page: draws what the simulation tells, tells it what pages want."""
+"""The live page: draws the updates of the simulation, sends it the requests of pages."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ import viser
 
 from proxcgal.core.errors import SimulationError
 from proxcgal.scenario.loading import Scenario
-from proxcgal.viewer.access import Gate
+from proxcgal.viewer.access import AccessControl
 from proxcgal.viewer.command_queue import CommandQueue
-from proxcgal.viewer.controls import Controls
-from proxcgal.viewer.drawing import Drawing, furnish
+from proxcgal.viewer.controller_panel import ControllerPanel
+from proxcgal.viewer.drawing import Drawing, add_surroundings
 from proxcgal.viewer.messages import Update
 from proxcgal.viewer.preparation import Preparation
-from proxcgal.viewer.simulation import FRAME_HZ, is_walk, simulate
+from proxcgal.viewer.simulation import FRAME_HZ, is_walk, run_simulation
 from proxcgal.viewer.walkthrough_panel import WalkPanel
 
 PLOT_HZ = 4.0
-WORD_HZ = 20.0  #: how often the simulation is told of wishes, at most
-_NOTED = 6.0  # [s] that a note stays
+REQUEST_HZ = 20.0  #: requests to the simulation, at most
+_NOTE_S = 6.0  # [s] that a note stays
 
 
 class LivePage:
@@ -32,7 +32,7 @@ class LivePage:
     def __init__(
         self,
         server: viser.ViserServer,
-        gate: Gate,
+        access: AccessControl,
         scenario: Scenario,
         controller: str,
         hz: float = FRAME_HZ,
@@ -40,35 +40,35 @@ class LivePage:
         """Starts the simulation in a process of its own.
 
         Args:
-            server: behind its gate.
-            gate: of the server.
+            server: behind its access control.
+            access: of the server.
             scenario: what to run.
             controller: one of CONTROLLERS.
             hz: moments drawn a second.
         """
         self.queue = CommandQueue()
-        self.told = Update()  #: the last moment that was drawn
+        self.last = Update()  #: the last moment that was drawn
         self.drawn = 0  #: moments so far
-        self.bounds = (0.0, 0.0)  #: d_min and buffer of the law [m]
+        self.bounds = (0.0, 0.0)  #: d_min and buffer of the controller [m]
         self._server = server
-        self._controls: Controls | WalkPanel = (
-            WalkPanel(server, gate, self.queue, scenario)
+        self._panel: ControllerPanel | WalkPanel = (
+            WalkPanel(server, access, self.queue, scenario)
             if is_walk(scenario)
-            else Controls(server, gate, self.queue, scenario, controller)
+            else ControllerPanel(server, access, self.queue, scenario, controller)
         )
         self._drawing: Drawing | None = None
         self._shown: tuple[object, ...] = ()
         self._note, self._noted = "", 0.0
         self._plotted = 0.0
-        self._waiting = True  # for the first stage: it takes no wishes before
-        self._staged = threading.Event()  # that came, or never will
+        self._waiting = True  # for the first model: no request before
+        self._scene_ready = threading.Event()  # or the simulation has failed
         self._preparation = Preparation(scenario)
         self._closing = threading.Event()
         self.failure: str | None = None  #: why the simulation ended, where it did by itself
         context = multiprocessing.get_context("spawn")
         self._link, theirs = context.Pipe()
         self._process = context.Process(
-            target=simulate, args=(theirs, scenario, controller, hz), daemon=True
+            target=run_simulation, args=(theirs, scenario, controller, hz), daemon=True
         )
         self._process.start()
         theirs.close()
@@ -81,7 +81,7 @@ class LivePage:
         Raises:
             SimulationError: the simulation failed before that, with the reason.
         """
-        self._staged.wait()
+        self._scene_ready.wait()
         if self._drawing is None and self.failure is not None:
             raise SimulationError(self.failure)
 
@@ -109,79 +109,79 @@ class LivePage:
 
     def _pump(self) -> None:
         try:
-            self._exchange(self._link)
+            self._receive_and_send(self._link)
         except (EOFError, OSError):
             self.failure = self.failure or "the simulation's process has ended"
         finally:
-            self._staged.set()
+            self._scene_ready.set()
 
-    def _exchange(self, link: Connection) -> None:
-        spoken = 0.0
+    def _receive_and_send(self, link: Connection) -> None:
+        sent = 0.0
         while not self._closing.is_set() and self.failure is None:
-            if link.poll(0.5 / WORD_HZ):
-                told = link.recv()
+            if link.poll(0.5 / REQUEST_HZ):
+                update = link.recv()
                 with self._server.atomic():
-                    self._take(told)
-                if told.moment is not None:
+                    self._take(update)
+                if update.moment is not None:
                     link.send(None)
             now = clock.monotonic()
-            if not self._waiting and now >= spoken + 1.0 / WORD_HZ:
-                spoken = now
+            if not self._waiting and now >= sent + 1.0 / REQUEST_HZ:
+                sent = now
                 if (choice := self._preparation.done()) is not None:
-                    self.queue.want(choice=choice)
+                    self.queue.put(choice=choice)
                 if (request := self.queue.take()) is not None:
                     if request.choice is not None:
                         request = replace(request, choice=self._preparation.asked(request.choice))
                         if self._preparation.busy:
-                            self._tell("preparing meshes ...")
+                            self._show_note("preparing meshes ...")
                     link.send(request)
-                    if request.reset or request.anew or request.release:
-                        self._controls.free()
+                    if request.reset or request.restart or request.release:
+                        self._panel.drop_handle()
 
-    def _take(self, told: Update) -> None:
-        if told.failed:
-            self.failure = told.failed
-            self._controls.status(Update(), f"the simulation has ended: {told.failed}")
-        if told.note:
-            self._tell(told.note)
-        if told.model is not None:
+    def _take(self, update: Update) -> None:
+        if update.failed:
+            self.failure = update.failed
+            self._panel.status(Update(), f"the simulation has ended: {update.failed}")
+        if update.note:
+            self._show_note(update.note)
+        if update.model is not None:
             self._waiting = False
             self._note = ""
-            if self._drawing is None or self._drawing.model.key != told.model.key:
+            if self._drawing is None or self._drawing.model.key != update.model.key:
                 if self._drawing is None:
-                    furnish(self._server, told.model)
+                    add_surroundings(self._server, update.model)
                 else:
                     self._drawing.remove()
-                self._drawing = Drawing(self._server.scene, told.model)
+                self._drawing = Drawing(self._server.scene, update.model)
                 self._shown = ()
-            self.bounds = told.model.d_min, told.model.buffer
-            self._controls.model(told.model, told.choice if told.refused else None)
-            self._staged.set()
-        if told.moment is not None and self._drawing is not None:
-            self.told = told
-            self._draw(told, self._drawing)
+            self.bounds = update.model.d_min, update.model.buffer
+            self._panel.show_model(update.model, update.choice if update.refused else None)
+            self._scene_ready.set()
+        if update.moment is not None and self._drawing is not None:
+            self.last = update
+            self._draw(update, self._drawing)
 
-    def _tell(self, note: str) -> None:
+    def _show_note(self, note: str) -> None:
         self._note, self._noted = note, clock.monotonic()
-        self._controls.status(self.told, note)
+        self._panel.status(self.last, note)
 
-    def _draw(self, told: Update, drawing: Drawing) -> None:
-        assert told.moment is not None
-        shown = (*self._controls.shown, self._controls.off)
+    def _draw(self, update: Update, drawing: Drawing) -> None:
+        assert update.moment is not None
+        shown = (*self._panel.shown, self._panel.silent)
         if shown != self._shown:
-            views, kept, removed = self._controls.shown
+            views, kept, removed = self._panel.shown
             drawing.views_visible(views)
             drawing.clouds_visible(kept, removed)
-            drawing.silence(self._controls.off)
+            drawing.silence(self._panel.silent)
             self._shown = shown
-        drawing.show(told.moment)
+        drawing.show(update.moment)
         self.drawn += 1
-        self._controls.told(told)
-        self._controls.plots.add(told.moment)
+        self._panel.move_handle(update)
+        self._panel.plots.add(update.moment)
         now = clock.monotonic()
         if now >= self._plotted + 1.0 / PLOT_HZ:
             self._plotted = now
-            kept = self._preparation.busy or now < self._noted + _NOTED
+            kept = self._preparation.busy or now < self._noted + _NOTE_S
             note = self._note if kept else ""
-            self._controls.status(told, note)
-            self._controls.plots.show(*self.bounds)
+            self._panel.status(update, note)
+            self._panel.plots.show(*self.bounds)

@@ -1,4 +1,4 @@
-"""What a page and its simulation tell each other, and how that waits to be sent."""
+"""Messages between a page and its simulation, and the queue in which they wait."""
 
 from __future__ import annotations
 
@@ -16,27 +16,27 @@ from proxcgal.viewer.scene_model import SceneModel
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Request:
-    """What a page wants since it last spoke; what it does not want anew is None."""
+    """Commands of a page since its last request; None: unchanged."""
 
     running: bool | None = None
     steps: int = 0  #: ticks, while it does not run
     reset: bool = False  #: the arm back to its start, the time to 0
-    hands: tuple[tuple[str, Array], ...] = ()  #: (4, 4) T_WO that each of these solids is to go to
+    moves: tuple[tuple[str, Array], ...] = ()  #: (4, 4) T_WO that each of these solids is to go to
     release: bool = False  #: all solids
-    off: frozenset[int] | None = None  #: rows of the sensors that are silent
+    silent: frozenset[int] | None = None  #: rows of the sensors that give no scans
     choice: Choice | None = None
     enable: bool = False  #: press the reset of a walk-through's guard
-    anew: bool = False  #: as `reset`, out of a STOP too: never from a message of a page
+    restart: bool = False  #: as `reset`, out of a STOP too: never from a message of a page
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Update:
-    """What the simulation tells a page."""
+    """State of the simulation, for a page."""
 
     moment: Posed | None = None
     model: SceneModel | None = None  #: where it is another one
-    choice: Choice | None = None  #: with the stage: what it was made with
-    refused: bool = False  #: with the choice: another one was wanted, and could not be
+    choice: Choice | None = None  #: with the model: what it was made with
+    refused: bool = False  #: with the choice: another one was requested and does not fit
     note: str = ""  #: what could not be done, or is being done
     late_us: tuple[float, float] = (0.0, 0.0)  #: of the last ticks' wake-ups: median and p99
     cpu_us: float = 0.0  #: median thread CPU of the last ticks
@@ -47,13 +47,13 @@ class Update:
 
 
 class Outbox:
-    """One moment at a time, the newest; notes and stages all. Sent by a thread of its own."""
+    """Sends the newest moment, one at a time, and all notes and models, in a thread of its own."""
 
     def __init__(self, link: Connection) -> None:
         """Args: `link` to the page."""
         self._link = link
         self._wake = threading.Condition()
-        self._sure: deque[Update] = deque()
+        self._certain: deque[Update] = deque()
         self._newest: Update | None = None
         self._free = True  # the page has taken the last moment
         self._closed = False
@@ -61,28 +61,28 @@ class Outbox:
         self._thread = threading.Thread(target=self._send, daemon=True)
         self._thread.start()
 
-    def offer(self, told: Update) -> None:
-        """Takes the place of what was not sent yet."""
+    def offer(self, update: Update) -> None:
+        """Replaces a moment that is not sent yet."""
         with self._wake:
             self.dropped += self._newest is not None
-            self._newest = told
+            self._newest = update
             self._wake.notify()
 
-    def tell(self, told: Update) -> None:
-        """Sent whatever happens."""
+    def send(self, update: Update) -> None:
+        """Sends it in any case."""
         with self._wake:
-            self._sure.append(told)
-            self._newest = None  # older than what is told now
+            self._certain.append(update)
+            self._newest = None  # older than this one
             self._wake.notify()
 
-    def taken(self) -> None:
-        """The page has drawn what it got."""
+    def acknowledge(self) -> None:
+        """The page has drawn the last moment."""
         with self._wake:
             self._free = True
             self._wake.notify()
 
     def close(self) -> None:
-        """What was told is sent, nothing after it, and the thread ends."""
+        """Sends what is left, and ends the thread."""
         with self._wake:
             self._closed = True
             self._wake.notify()
@@ -93,12 +93,12 @@ class Outbox:
             while True:
                 with self._wake:
                     self._wake.wait_for(
-                        lambda: self._sure or self._closed or (self._free and self._newest)
+                        lambda: self._certain or self._closed or (self._free and self._newest)
                     )
-                    if self._sure:
-                        told: Update | None = self._sure.popleft()
+                    if self._certain:
+                        update: Update | None = self._certain.popleft()
                     elif self._closed:
                         return
                     else:
-                        told, self._newest, self._free = self._newest, None, False
-                self._link.send(told)
+                        update, self._newest, self._free = self._newest, None, False
+                self._link.send(update)

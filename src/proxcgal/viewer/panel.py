@@ -1,8 +1,7 @@
-"""What every panel of the live page has: buttons, lists, and the handle to drag with."""
+"""Parts of every panel of the live page: buttons, lists, and the handle to drag with."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,10 +10,10 @@ import viser.transforms
 
 from proxcgal.sim.moment import Posed
 from proxcgal.trial.walkthrough.grip import HAND
-from proxcgal.viewer.access import Gate
-from proxcgal.viewer.client_messages import between, one_of, switch
+from proxcgal.viewer.access import AccessControl
+from proxcgal.viewer.allowed_controls import AllowedControls
 from proxcgal.viewer.command_queue import ROOM, CommandQueue
-from proxcgal.viewer.drawing import pose_parts, viewpoint
+from proxcgal.viewer.drawing import initial_viewpoint, pose_parts
 from proxcgal.viewer.messages import Update
 from proxcgal.viewer.scene_model import SceneModel
 
@@ -22,73 +21,85 @@ HANDLE = "/handle"
 _HANDLE_SHARE = 0.1  # of the distance that a page begins to look from: large enough to be caught
 
 
-class Panel:
-    """Puts on the desk what pages want; every control is offered at the gate."""
+class Panel(AllowedControls):
+    """Puts the commands of pages on the queue."""
 
-    off: frozenset[int] = frozenset()  #: rows of the sensors that are silent
+    silent: frozenset[int] = frozenset()  #: rows of the sensors that give no scans
 
-    def __init__(self, server: viser.ViserServer, gate: Gate, queue: CommandQueue) -> None:
+    def __init__(
+        self, server: viser.ViserServer, access: AccessControl, queue: CommandQueue
+    ) -> None:
         """Adds the status line and the buttons of the simulation."""
-        self._server, self._gate, self._queue = server, gate, queue
+        super().__init__(server, access)
+        self._queue = queue
         self._model: SceneModel | None = None
-        self._of_stage: list[Any] = []
+        self._of_model: list[Any] = []
         self._held = False
-        gui = server.gui
-        gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
-        gui.main_panel.dock_right()
-        self._status = gui.add_markdown("setting up ...")
-        self._buttons(
+        self._status = server.gui.add_markdown("setting up ...")
+        self.add_buttons(
             "simulation",
             {
-                "run": lambda: queue.want(running=True),
-                "pause": lambda: queue.want(running=False),
-                "step": lambda: queue.want(running=False, steps=1),
-                "reset": lambda: queue.want(reset=True),
+                "run": lambda: queue.put(running=True),
+                "pause": lambda: queue.put(running=False),
+                "step": lambda: queue.put(running=False, steps=1),
+                "reset": lambda: queue.put(reset=True),
             },
         )
 
     @property
     def shown(self) -> tuple[bool, bool, bool]:
-        """Fields of view, filtered cloud, removed points: are they to be seen?"""
+        """Visibility of fields of view, filtered cloud, removed points."""
         return True, True, True
 
-    def told(self, told: Update) -> None:
-        """Where the handle is while nobody holds it."""
-        moment = told.moment
+    def move_handle(self, update: Update) -> None:
+        """Puts the handle where the dragged thing is, unless a page holds it."""
+        moment = update.moment
         assert moment is not None
-        if self._of_stage and not self._held:
-            handle = self._of_stage[0]
+        if self._of_model and not self._held:
+            handle = self._of_model[0]
             wxyz, position = pose_parts(self._place(moment))
             if not np.allclose(handle.position, position, atol=1e-4):
                 handle.position = position
             if not np.allclose(handle.wxyz, wxyz, atol=1e-4):
                 handle.wxyz = wxyz
 
-    def free(self) -> None:
-        """Nobody holds anything any more."""
+    def status(self, update: Update, note: str) -> None:
+        """Shows the state above the buttons, and a note."""
+        lines = [] if update.moment is None else self._lines(update)
+        if lines and note:
+            lines.append(f"**{note}**")
+        if lines or note:
+            self._status.content = "  \n".join(lines) or note
+
+    def _lines(self, update: Update) -> list[str]:
+        """The state at a moment, in Markdown."""
+        raise NotImplementedError
+
+    def drop_handle(self) -> None:
+        """No page holds the handle any more."""
         self._held = False
 
     def _dragging(self, model: SceneModel, title: str) -> None:
         """The handle, and the list of what it moves."""
-        self._of_stage.append(self._handle(model))
+        self._of_model.append(self._handle(model))
         folder = self._server.gui.add_folder(title)
         with folder:
-            names = list(dict.fromkeys(model.grips))
-            self._which = self._list("drag", names, first_grip(model))
-            self._which.on_update(self._other)
-            self._button("let go", self._let_go)
-        self._of_stage.append(folder)
+            names = list(dict.fromkeys(model.draggable))
+            self._which = self.add_list("drag", names, first_draggable(model))
+            self._which.on_update(self._other_chosen)
+            self.add_button("let go", self._release)
+        self._of_model.append(folder)
 
     def _handle(self, model: SceneModel) -> Any:
         (x0, y0, z0), (x1, y1, z1) = ROOM.tolist()
-        name, T_W = first_grip(model), np.eye(4)
+        name, T_W = first_draggable(model), np.eye(4)
         T_W[:3, 3] = model.tool_W
         if name in model.names:
             T_W = model.solids_W[model.names.index(name)]
         wxyz, position = pose_parts(T_W)
+        away = float(np.linalg.norm(np.subtract(*initial_viewpoint(model))))
         handle = self._server.scene.add_transform_controls(
-            HANDLE, scale=_HANDLE_SHARE * float(np.linalg.norm(np.subtract(*viewpoint(model)))),
-            depth_test=False, wxyz=wxyz, position=position,
+            HANDLE, scale=_HANDLE_SHARE * away, depth_test=False, wxyz=wxyz, position=position,
             translation_limits=((x0, x1), (y0, y1), (z0, z1)),
         )  # fmt: skip
 
@@ -110,71 +121,30 @@ class Panel:
             return moment.hand_W
         return moment.solids_W[self._model.names.index(self._which.value)]
 
-    async def _other(self, _: Any) -> None:
+    async def _other_chosen(self, _: Any) -> None:
         self._held = False  # the handle goes to what is chosen
 
-    def _let_go(self) -> None:
+    def _release(self) -> None:
         self._held = False
-        self._queue.want(release=True)
-
-    def _button(self, label: str, work: Callable[[], None]) -> Any:
-        button = self._server.gui.add_button(label)
-        self._gate.offer(button, switch)
-
-        async def clicked(_: Any) -> None:
-            work()
-
-        button.on_click(clicked)
-        return button
-
-    def _buttons(self, label: str, work: Mapping[str, Callable[[], None]]) -> None:
-        group = self._server.gui.add_button_group(label, tuple(work))
-        self._gate.offer(group, one_of(work))
-
-        async def clicked(event: Any) -> None:
-            work[event.target.value]()
-
-        group.on_click(clicked)
-
-    def _list(self, label: str, options: Sequence[str], value: str) -> Any:
-        control = self._server.gui.add_dropdown(label, tuple(options), initial_value=value)
-        self._gate.offer(control, one_of(options))
-        return control
-
-    def _switch(self, label: str, value: bool, work: Callable[[bool], None] | None) -> Any:
-        control = self._server.gui.add_checkbox(label, value)
-        self._gate.offer(control, switch)
-        if work is not None:
-
-            async def changed(event: Any) -> None:
-                work(bool(event.target.value))
-
-            control.on_update(changed)
-        return control
-
-    def _slider(self, label: str, bounds: tuple[float, float, float], value: float) -> Any:
-        low, high, step = min(bounds[0], value), max(bounds[1], value), bounds[2]
-        control = self._server.gui.add_slider(label, low, high, step, value)
-        self._gate.offer(control, between(low, high))
-        return control
+        self._queue.put(release=True)
 
 
-def first_grip(model: SceneModel) -> str:
+def first_draggable(model: SceneModel) -> str:
     """What the handle begins at: a hand where there is one, else what is nearest to the tool."""
-    if HAND in model.grips:
+    if HAND in model.draggable:
         return HAND
-    hands = [name for name in model.grips if "hand" in name] or list(model.grips)
+    hands = [name for name in model.draggable if "hand" in name] or list(model.draggable)
     far = np.linalg.norm(model.solids_W[:, :3, 3] - model.tool_W, axis=1)
     return min(hands, key=lambda name: float(far[model.names.index(name)]))
 
 
-def pace(told: Update) -> str:
+def pace(update: Update) -> str:
     """Whether it runs, and how far behind real time, where it is."""
-    behind = f", {100.0 * told.real_time:.0f} % of real time" if told.real_time < 0.97 else ""
-    return ("" if told.running else ", paused") + behind
+    behind = f", {100.0 * update.real_time:.0f} % of real time" if update.real_time < 0.97 else ""
+    return ("" if update.running else ", paused") + behind
 
 
-def timing(told: Update, what: str) -> str:
+def timing(update: Update, what: str) -> str:
     """What one `what` took, and how late they were."""
-    late, latest = (us / 1e3 for us in told.late_us)
-    return f"{what} {told.cpu_us:.0f} us of CPU, late by {late:.1f} ms (p99 {latest:.0f})"
+    late, latest = (us / 1e3 for us in update.late_us)
+    return f"{what} {update.cpu_us:.0f} us of CPU, late by {late:.1f} ms (p99 {latest:.0f})"

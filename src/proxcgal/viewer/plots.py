@@ -22,37 +22,63 @@ _SEEN, _TRUE, _BOUND, _GREEN, _ORANGE = "#d61e28", "#2a5fb0", "#8a8f98", "#10963
 _HEIGHT = 165  # [px]
 
 
+class RecentRows:
+    """Numbers over the last 10 s."""
+
+    def __init__(self) -> None:
+        """None yet."""
+        self._rows: deque[tuple[float, ...]] = deque()
+
+    @property
+    def last(self) -> float | None:
+        """Time of the last row [s]."""
+        return self._rows[-1][0] if self._rows else None
+
+    @property
+    def drawable(self) -> bool:
+        """Whether there are rows enough for a curve."""
+        return len(self._rows) > 1
+
+    def add(self, elapsed: float, *values: float) -> None:
+        """Adds a row in place of one of the same time; an earlier time clears the others."""
+        if self._rows and elapsed < self._rows[-1][0]:
+            self._rows.clear()
+        if self._rows and elapsed == self._rows[-1][0]:
+            self._rows.pop()
+        self._rows.append((elapsed, *values))
+        while self._rows[0][0] < elapsed - SPAN:
+            self._rows.popleft()
+
+    def columns(self) -> Array:
+        """Times [s], then each number, (1 + numbers, rows)."""
+        return np.array(self._rows).T
+
+
 class Plots:
     """Two plots in the page's panel, over the last 10 s."""
 
     def __init__(self, gui: viser.GuiApi) -> None:
         """Adds them."""
-        self._rows: deque[tuple[float, float, float, float]] = deque()
+        self._rows = RecentRows()
         self._distance = _distances(gui, ("seen", _SEEN, ()), ("true", _TRUE, (5, 4)))
         self._activation = _activations(gui, ("activation", _GREEN, ()))
 
     def add(self, moment: Posed) -> None:
-        """One moment more; a time before the last one begins anew."""
+        """One moment more; an earlier time than the last one clears the curves."""
         assert isinstance(moment, Moment)
-        if self._rows and moment.elapsed < self._rows[-1][0]:
-            self._rows.clear()
-        if self._rows and moment.elapsed == self._rows[-1][0]:
-            self._rows.pop()
-        self._rows.append((moment.elapsed, moment.seen, moment.true, moment.activation))
-        while self._rows[0][0] < moment.elapsed - SPAN:
-            self._rows.popleft()
+        self._rows.add(moment.elapsed, moment.seen, moment.true, moment.activation)
 
     def show(self, d_min: float, buffer: float) -> None:
-        """Draws what was added, with the law's two thresholds [m]."""
-        if len(self._rows) < 2:
+        """Draws what was added, with the controller's two thresholds [m]."""
+        if not self._rows.drawable:
             return
-        time, seen, true, activation = np.array(self._rows).T
+        time, seen, true, activation = self._rows.columns()
         low, high = np.full_like(time, d_min), np.full_like(time, d_min + buffer)
         self._distance.data = (time, _drawn(seen), _drawn(true), low, high)
         self._activation.data = (time, activation)
 
 
-def whole_run(
+def plot_whole_run(
     gui: viser.GuiApi, moments: Sequence[Moment], again: Sequence[Moment] | None, model: SceneModel
 ) -> None:
     """The same plots of a recorded run, and of the one that was computed again beside it."""

@@ -25,7 +25,7 @@ class Preparation:
 
     @property
     def busy(self) -> bool:
-        """Is something being made?"""
+        """Whether something is being made."""
         return self._process is not None
 
     def asked(self, choice: Choice) -> Choice | None:
@@ -41,7 +41,7 @@ class Preparation:
         return None
 
     def done(self) -> Choice | None:
-        """The choice whose meshes are ready now; what went wrong is told when it is set up."""
+        """The choice whose meshes are ready now; errors are reported when it is set up."""
         if self._process is None or self._process.is_alive():
             return None
         choice, self._process, self._choice = self._choice, None, None

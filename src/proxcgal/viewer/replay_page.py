@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 import time as clock
+from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 import viser
 
 from proxcgal.core import modes
+from proxcgal.recording.reader import Recording
 from proxcgal.sim.moment import Moment, metres
-from proxcgal.viewer.access import Gate
-from proxcgal.viewer.client_messages import between, one_of, switch
-from proxcgal.viewer.drawing import Drawing, furnish
-from proxcgal.viewer.plots import whole_run
-from proxcgal.viewer.replayed import AHEAD, Replayed
+from proxcgal.viewer.access import AccessControl
+from proxcgal.viewer.allowed_controls import AllowedControls
+from proxcgal.viewer.drawing import Drawing, add_surroundings
+from proxcgal.viewer.page_server import checked_token, page_address, served_page
+from proxcgal.viewer.plots import plot_whole_run
+from proxcgal.viewer.replay_moments import AHEAD, ReplayedRun, replay_moments
 
 HZ = 15.0  #: moments of a second of the recording
 _SPEEDS = ("1/4", "1/2", "1", "2")
@@ -27,19 +32,19 @@ class ReplayPage:
     def __init__(
         self,
         server: viser.ViserServer,
-        gate: Gate,
-        recorded: Replayed,
-        again: Replayed | None,
-        words: str,
+        access: AccessControl,
+        recorded: ReplayedRun,
+        again: ReplayedRun | None,
+        text: str,
     ) -> None:
         """Draws the first moment.
 
         Args:
-            server: behind its gate.
-            gate: of the server.
+            server: behind its access control.
+            access: of the server.
             recorded: the run itself.
             again: its inputs under other settings; the same moments.
-            words: what there is to say of both, in Markdown.
+            text: about both, in Markdown.
         """
         self._recorded, self._again = recorded, again
         self._times = np.array([moment.elapsed for moment in recorded.moments])
@@ -48,39 +53,28 @@ class ReplayPage:
         self._playing = False
         self._row = -1
         self._closing = threading.Event()
-        furnish(server, recorded.model)
+        add_surroundings(server, recorded.model)
         self._drawings = [Drawing(server.scene, recorded.model)]
         if again is not None:
             self._drawings.append(Drawing(server.scene, again.model, name="/again", ghost=True))
-        gui = server.gui
-        gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
-        gui.main_panel.dock_right()
-        gui.add_markdown(words)
-        end = float(self._times[-1])
-        self._line: Any = gui.add_slider("time [s]", 0.0, max(end, 0.01), 0.01, 0.0)
-        gate.offer(self._line, between(0.0, end))
-        buttons = gui.add_button_group("replay", ("play", "pause", "back", "next"))
-        gate.offer(buttons, one_of(("play", "pause", "back", "next")))
-        self._speed = gui.add_dropdown("speed", _SPEEDS, initial_value="1")
-        gate.offer(self._speed, one_of(_SPEEDS))
-        self._views = gui.add_checkbox("fields of view", True)
-        gate.offer(self._views, switch)
+        gui, controls = server.gui, AllowedControls(server, access)
+        gui.add_markdown(text)
+        end = max(float(self._times[-1]), 0.01)
+        self._line = controls.add_slider("time [s]", (0.0, end, 0.01), 0.0)
+        controls.add_buttons(
+            "replay",
+            {name: partial(self._press, name) for name in ("play", "pause", "back", "next")},
+        )
+        self._speed = controls.add_list("speed", _SPEEDS, "1")
+        controls.add_switch("fields of view", True, self._drawings[0].views_visible)
         self._status = gui.add_markdown("")
-        whole_run(gui, recorded.moments, again.moments if again else None, recorded.model)
+        plot_whole_run(gui, recorded.moments, again.moments if again else None, recorded.model)
 
         async def scrubbed(_: Any) -> None:
             # The nearest: the line counts in hundredths of a second, and moments may lie between.
             self.show(int(np.abs(self._times - self._line.value).argmin()))
 
-        async def pressed(event: Any) -> None:
-            self._press(event.target.value)
-
-        async def views(_: Any) -> None:
-            self._drawings[0].views_visible(self._views.value)
-
         self._line.on_update(scrubbed)
-        buttons.on_click(pressed)
-        self._views.on_update(views)
         self.show(0)
         self._thread = threading.Thread(target=self._play, daemon=True)
         self._thread.start()
@@ -144,20 +138,20 @@ class ReplayPage:
 
 
 def _status(moment: Moment, other: Moment | None) -> str:
-    lines = [f"**{modes.NAMES[moment.mode]}** at {moment.elapsed:.2f} s", _words(moment)]
+    lines = [f"**{modes.NAMES[moment.mode]}** at {moment.elapsed:.2f} s", _numbers_text(moment)]
     if moment.found:
         lines.append("found: " + ", ".join(moment.found))
     if other is not None:
         apart = float(np.abs(moment.qd - other.qd).max())
         lines += [
-            f"**recomputed: {modes.NAMES[other.mode]}**", _words(other),
+            f"**recomputed: {modes.NAMES[other.mode]}**", _numbers_text(other),
             f"commands apart by up to {apart:.4f} rad/s; the see-through arm is where the "
             f"recomputed one leads in {AHEAD:g} s",
         ]  # fmt: skip
     return "  \n".join(lines)
 
 
-def _words(moment: Moment) -> str:
+def _numbers_text(moment: Moment) -> str:
     seen, true = map(metres, (moment.seen, moment.true))
     return (
         f"seen {seen}, true {true}, activation {moment.activation:.2f}, "
@@ -165,8 +159,49 @@ def _words(moment: Moment) -> str:
     )
 
 
-def said(recorded: Replayed, again: Replayed | None) -> str:
-    """Is the recording repeated bit for bit, and what was computed beside it?"""
+def view_recording(
+    recording: Recording,
+    controller: str | None,
+    changes: Sequence[str],
+    *,
+    host: str,
+    port: int,
+    token: str | None,
+) -> None:
+    """Serves the page of a recording until interrupted; prints its address.
+
+    Args:
+        recording: of a run, not empty.
+        controller: beside the recorded one; None: none, unless anything is changed.
+        changes: `key.sub=value` on the recorded scenario, for the run beside it.
+        host: address to listen on.
+        port: 0 for any that is free.
+        token: that every viewer must show, as typed.
+
+    Raises:
+        ConfigError: an address that cannot be listened on, a bad token or change.
+    """
+    token = checked_token(host, port, token)
+    recorded = replay_moments(recording, HZ)
+    again = None
+    if controller is not None or changes:
+        again = replay_moments(recording, HZ, controller, changes, ahead=True)
+    text = comparison_text(recorded, again)
+    label = f"proxcgal: {recording.path.name}"
+    with served_page(host, port, label=label, token=token) as (server, access):
+        page = ReplayPage(server, access, recorded, again, text)
+        try:
+            print(text)
+            print(page_address(host, server.get_port(), token), flush=True)
+            if sys.stdout.isatty():
+                print("Ctrl-C: end; with --no-view: lines here instead of the page", flush=True)
+            threading.Event().wait()
+        finally:
+            page.close()
+
+
+def comparison_text(recorded: ReplayedRun, again: ReplayedRun | None) -> str:
+    """Whether the recording is repeated bit for bit, and the differences of what is beside it."""
     if recorded.same is None:
         text = "holds ticks with scans only: shown as recorded, without clouds"
     elif recorded.same == recorded.ticks:

@@ -12,8 +12,8 @@ from proxcgal.core.errors import ConfigError
 from proxcgal.recording.reader import read_recording
 from proxcgal.scenario.loading import load_scenario
 from proxcgal.trial.interactive import LiveTrial
-from proxcgal.viewer.export import Played, exported
-from proxcgal.viewer.replayed import Replayed, replayed
+from proxcgal.viewer.export import ArmMotion, exported_scene
+from proxcgal.viewer.replay_moments import ReplayedRun, replay_moments
 from proxcgal.viewer.scene_model import SceneModel
 
 _HZ = 10.0  # moments a second, where the run is short
@@ -38,9 +38,9 @@ def replay_scene(files: Sequence[Path]) -> tuple[bytes, tuple[str, ...]]:
         raise ConfigError(f"{', '.join(empty)}: holds no tick")
     ends = [len(r.ticks) / r.settings.scenario.simulation.control_hz for r in recordings]
     hz = min(_HZ, _MOMENTS / max(ends))
-    runs = [replayed(recording, hz) for recording in recordings]
+    runs = [replay_moments(recording, hz) for recording in recordings]
     played = _together(runs)
-    return exported(played[0], played[1:]), tuple(run.controller for run in runs)
+    return exported_scene(played[0], played[1:]), tuple(run.controller for run in runs)
 
 
 def still_scene(name: str) -> bytes:
@@ -52,10 +52,10 @@ def still_scene(name: str) -> bytes:
     trial = LiveTrial(load_scenario(name), "wb")
     for _ in range(round(_SEEN_AFTER / trial.period)):
         trial.step()
-    return exported(Played(SceneModel.of(trial.setup), [trial.moment()]))
+    return exported_scene(ArmMotion(SceneModel.of(trial.setup), [trial.moment()]))
 
 
-def _together(runs: Sequence[Replayed]) -> list[Played]:
+def _together(runs: Sequence[ReplayedRun]) -> list[ArmMotion]:
     """The runs on the first one's times; one that ended earlier stays where it ended."""
     longest = max(runs, key=lambda run: run.moments[-1].elapsed)
     times = [moment.elapsed for moment in longest.moments]
@@ -67,5 +67,5 @@ def _together(runs: Sequence[Replayed]) -> list[Played]:
             replace(run.moments[int(row)], elapsed=time)
             for row, time in zip(rows, times, strict=True)
         ]
-        out.append(Played(run.model, moments))
+        out.append(ArmMotion(run.model, moments))
     return out

@@ -1,4 +1,4 @@
-"""What a page shows and what does not change while it does; plain data, for another process too."""
+"""The parts of a page's scene that do not change; plain data, for another process too."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class SceneModel:
     field_of_view: float  #: [rad] of a sensor, from side to side
     names: tuple[str, ...]  #: of the solids
     sensed: tuple[str, ...]  #: of them; no other is seen by any sensor
-    grips: tuple[str, ...]  #: what can be dragged: solids that are sensed, a hand at the tool
+    draggable: tuple[str, ...]  #: what can be dragged: solids that are sensed, a hand at the tool
     solids: tuple[Solid, ...]
     solids_W: Array  #: (solids, 4, 4) T_WO at the start
     tool_W: Array  #: (3,) at the start [m]
@@ -58,7 +58,7 @@ class SceneModel:
             field_of_view=setup.scenario.skin.sensor.field_of_view,
             names=setup.drawn.names,
             sensed=setup.scene.names,
-            grips=((HAND,) if setup.scenario.kind == "guided" else ()) + setup.scene.names,
+            draggable=((HAND,) if setup.scenario.kind == "guided" else ()) + setup.scene.names,
             solids=setup.drawn.solids,
             solids_W=np.asarray(setup.drawn.poses(0.0)),
             tool_W=np.asarray(setup.robot.tool_pose(setup.q0))[:3, 3],
@@ -83,7 +83,7 @@ class SceneModel:
             field_of_view=0.0,
             names=(OPERATOR,),
             sensed=(OPERATOR,),
-            grips=(HAND,),
+            draggable=(HAND,),
             solids=(Capsule(human.radius, human.height - 2.0 * human.radius),),
             solids_W=trial.operator_W()[None],
             tool_W=np.asarray(setup.robot.tool_pose(setup.q0))[:3, 3],
@@ -91,13 +91,13 @@ class SceneModel:
 
     @property
     def key(self) -> tuple[Any, ...]:
-        """The same for stages that need no drawing anew."""
+        """Equal for models that are drawn alike."""
         return (
             self.robot,
             self.links,
             self.sensors,
             self.names,
-            self.grips,
+            self.draggable,
             self.solids,
             self.sensors_L.tobytes(),
         )

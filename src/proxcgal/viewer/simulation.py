@@ -1,8 +1,8 @@
 """The simulation beside a page, in a process of its own: real time, whatever the page does.
 
-Towards the page goes at most one moment at a time; what is not fetched is dropped. A thread sends
-it, so that a tick never waits for a page. From the page come wishes; none of them leads out of a
-STOP: only whoever started the command begins anew then.
+At most one moment at a time goes to the page; what is not fetched is dropped. A thread sends it, so
+that a tick never waits for a page. No request of a page leads out of a STOP: only the terminal that
+runs the command restarts then.
 """
 
 from __future__ import annotations
@@ -27,26 +27,28 @@ from proxcgal.viewer.scene_model import SceneModel
 
 FRAME_HZ = 15.0  #: moments that are offered to the page
 LOST = 0.1  #: [s] behind real time from which what is lost stays lost
-_LATENESS = 1000  # ticks that the lateness is told of
+_LATENESS = 1000  # ticks whose lateness is reported
 
 
 def is_walk(scenario: Scenario) -> TypeGuard[WalkScenario]:
-    """Is it the walk-through cell, which has a guard and no law to choose?"""
+    """Is it the walk-through cell, which has a guard and no controller to choose?"""
     return isinstance(scenario, WalkScenario)
 
 
-def simulate(link: Connection, scenario: Scenario, controller: str, hz: float = FRAME_HZ) -> None:
+def run_simulation(
+    link: Connection, scenario: Scenario, controller: str, hz: float = FRAME_HZ
+) -> None:
     """Runs until the other end of `link` is closed; the target of a process."""
     outbox = Outbox(link)
-    warnings.simplefilter("ignore", ModelWarning)  # the command's own process has told it
+    warnings.simplefilter("ignore", ModelWarning)  # the command's own process has warned
     try:
         _Simulation(outbox, link, scenario, controller, hz).run()
     except (EOFError, BrokenPipeError, ConnectionResetError, KeyboardInterrupt):
         pass
     except ProxError as error:
-        outbox.tell(Update(failed=str(error)))
+        outbox.send(Update(failed=str(error)))
     except Exception as error:  # the page is to say so, not to stand still
-        outbox.tell(Update(failed=f"{type(error).__name__}: {error}"))
+        outbox.send(Update(failed=f"{type(error).__name__}: {error}"))
         raise
     finally:
         outbox.close()
@@ -63,13 +65,13 @@ class _Simulation:
         self._base = scenario
         self._choice = None if is_walk(scenario) else Choice.of(scenario, controller)
         self._frame = 1.0 / hz
-        self._off: frozenset[int] = frozenset()
+        self._silent: frozenset[int] = frozenset()
         self._running = True
         self._trial: LiveTrial | WalkTrial = (
             WalkTrial(scenario) if is_walk(scenario) else LiveTrial(scenario, controller)
         )
-        self._fresh()
-        self._model()
+        self._first_step()
+        self._send_model()
 
     def run(self) -> None:
         """Tick after tick, each when it is due."""
@@ -78,7 +80,7 @@ class _Simulation:
         while True:
             steps = 0
             for request in self._received(wait=0.0 if self._running else 0.02):
-                steps += self._grant(request)
+                steps += self._apply(request)
             now = clock.monotonic()
             if not self._running and steps == 0:
                 due = begin = now
@@ -86,7 +88,7 @@ class _Simulation:
                 if shown != self._trial.elapsed or now >= frame_due + 1.0:
                     frame_due = now
                     shown = self._trial.elapsed
-                    self._show(1.0)
+                    self._offer_moment(1.0)
                 continue
             for _ in range(max(steps, 1)):
                 self._tick(max(now - due, 0.0) if self._running else None)
@@ -94,7 +96,7 @@ class _Simulation:
             if now >= frame_due or not self._running:
                 frame_due = max(frame_due + self._frame, now)
                 shown = self._trial.elapsed
-                self._show(min(simulated / max(clock.monotonic() - begin, 1e-6), 1.0))
+                self._offer_moment(min(simulated / max(clock.monotonic() - begin, 1e-6), 1.0))
                 if clock.monotonic() - begin > 2.0:
                     begin, simulated = clock.monotonic(), 0.0
             due = max(due + self._trial.period, clock.monotonic() - LOST)
@@ -105,35 +107,37 @@ class _Simulation:
             wait = 0.0
             message = self._link.recv()
             if message is None:
-                self._outbox.taken()
+                self._outbox.acknowledge()
             else:
                 yield message
 
-    def _grant(self, request: Request) -> int:
-        """Does what is wanted; how many single ticks are still to be made."""
+    def _apply(self, request: Request) -> int:
+        """Carries a request out; the number of single ticks that are still to be made."""
         stopped = self._trial.stopped
-        if request.anew or (request.reset and not stopped):
+        if request.restart or (request.reset and not stopped):
             self._restart()
         elif request.reset or (request.choice is not None and stopped):
-            self._note(f"{self._latched}: only Enter where `proxcgal view` runs leads out of it")
+            self._send_note(
+                f"{self._stop_reason}: only Enter where `proxcgal view` runs leads out of it"
+            )
         if request.choice is not None and not stopped and request.choice != self._choice:
             self._choose(request.choice)
         if request.running is not None:
             self._running = request.running
         if request.release:
             self._trial.release()
-        for name, pose in request.hands:
+        for name, pose in request.moves:
             self._trial.move(name, pose)
-        if request.off is not None:
-            self._off = request.off
+        if request.silent is not None:
+            self._silent = request.silent
             if isinstance(self._trial, LiveTrial):
-                self._trial.off = request.off
+                self._trial.off = request.silent
         if request.enable and isinstance(self._trial, WalkTrial):
             self._trial.enable()
         return 0 if self._running else min(request.steps, 100)
 
     @property
-    def _latched(self) -> str:
+    def _stop_reason(self) -> str:
         if isinstance(self._trial, WalkTrial):
             return "a stop took longer than the guard declares"
         return "the controller has stopped"
@@ -147,11 +151,11 @@ class _Simulation:
             assert self._choice is not None
             scenario = self._choice.applied(self._base)
             self._trial = LiveTrial(scenario, self._choice.controller, robot=old.setup.robot)
-            self._trial.off = self._off
-        self._fresh()
+            self._trial.off = self._silent
+        self._first_step()
 
     def _choose(self, choice: Choice) -> None:
-        """Another law or robot, at rest: where the arm is, where that is the same robot."""
+        """Another controller or robot, at rest: where the arm is, where that is the same robot."""
         old, own = self._trial, self._choice
         if not isinstance(old, LiveTrial) or own is None:
             return
@@ -164,17 +168,17 @@ class _Simulation:
                 hands=old.hands if keep else None, since=old.elapsed if keep else 0.0,
             )  # fmt: skip
         except ProxError as error:
-            self._note(str(error))
-            self._model(refused=True)
+            self._send_note(str(error))
+            self._send_model(refused=True)
             return
         if not keep:
-            self._off = frozenset()
-        self._trial.off = self._off
+            self._silent = frozenset()
+        self._trial.off = self._silent
         self._choice = choice
-        self._fresh()
-        self._model()
+        self._first_step()
+        self._send_model()
 
-    def _fresh(self) -> None:
+    def _first_step(self) -> None:
         self._late: deque[float] = deque(maxlen=_LATENESS)
         self._cpu: deque[float] = deque(maxlen=_LATENESS)
         self._trial.step()
@@ -185,7 +189,7 @@ class _Simulation:
         self._trial.step()
         self._cpu.append(self._trial.cpu_us)
 
-    def _show(self, real_time: float) -> None:
+    def _offer_moment(self, real_time: float) -> None:
         late = np.array(self._late or [0.0])
         self._outbox.offer(
             Update(
@@ -196,16 +200,16 @@ class _Simulation:
             )
         )  # fmt: skip
 
-    def _model(self, *, refused: bool = False) -> None:
+    def _send_model(self, *, refused: bool = False) -> None:
         trial = self._trial
         model = (
             SceneModel.of_walk(trial)
             if isinstance(trial, WalkTrial)
             else SceneModel.of(trial.setup)
         )
-        self._outbox.tell(
+        self._outbox.send(
             Update(model=model, choice=self._choice, running=self._running, refused=refused)
         )
 
-    def _note(self, text: str) -> None:
-        self._outbox.tell(Update(note=text, running=self._running))
+    def _send_note(self, text: str) -> None:
+        self._outbox.send(Update(note=text, running=self._running))

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections import deque
-
 import numpy as np
 import viser
 
 from proxcgal.scenario.walkthrough import Guard, WalkScenario
 from proxcgal.sim.moment import Posed
 from proxcgal.trial.walkthrough.interactive import WalkMoment
-from proxcgal.viewer.access import Gate
+from proxcgal.viewer.access import AccessControl
 from proxcgal.viewer.command_queue import CommandQueue
 from proxcgal.viewer.messages import Update
 from proxcgal.viewer.panel import Panel, pace, timing
-from proxcgal.viewer.plots import SPAN, plot
+from proxcgal.viewer.plots import RecentRows, plot
 from proxcgal.viewer.scene_model import SceneModel
 
 ENABLE = "enable torque"
@@ -28,31 +26,47 @@ class WalkPanel(Panel):
     """Drag the hand; look at what the guard watches; switch the torque on again."""
 
     def __init__(
-        self, server: viser.ViserServer, gate: Gate, queue: CommandQueue, scenario: WalkScenario
+        self,
+        server: viser.ViserServer,
+        access: AccessControl,
+        queue: CommandQueue,
+        scenario: WalkScenario,
     ) -> None:
         """Adds everything."""
-        super().__init__(server, gate, queue)
-        self._button(ENABLE, lambda: queue.want(enable=True))
+        super().__init__(server, access, queue)
+        self.add_button(ENABLE, lambda: queue.put(enable=True))
         self.plots = WalkPlots(server.gui, scenario.guard)
 
-    def model(self, model: SceneModel, back: object) -> None:
-        """The stage, which stays the same."""
+    def show_model(self, model: SceneModel, back: object) -> None:
+        """Controls of the model, which stays the same."""
         if self._model is None:
             self._model = model
             self._dragging(model, "hand")
 
-    def told(self, told: Update) -> None:
-        """Where the handle is: at the tool, where no hand holds that."""
-        if isinstance(told.moment, WalkMoment) and told.moment.state != "on":
+    def move_handle(self, update: Update) -> None:
+        """Puts the handle at the tool, unless a hand holds that."""
+        if isinstance(update.moment, WalkMoment) and update.moment.state != "on":
             self._held = False  # a hand lets go of an arm that has stopped
-        super().told(told)
+        super().move_handle(update)
 
-    def status(self, told: Update, note: str) -> None:
-        """The lines above the buttons."""
-        if isinstance(told.moment, WalkMoment):
-            self._status.content = status(told, told.moment, note)
-        elif note:
-            self._status.content = note
+    def _lines(self, update: Update) -> list[str]:
+        moment = update.moment
+        assert isinstance(moment, WalkMoment)
+        lines = [f"{_state(moment)} at {moment.elapsed:.1f} s{pace(update)}"]
+        if moment.trip:
+            count = "" if moment.trips == 1 else f", {moment.trips} trips so far"
+            when = "last trip" if moment.state == "on" else "tripped"
+            lines.append(f"{when}: **{moment.trip}**{count}")
+            if moment.state == "off":
+                lines.append(f"at rest {moment.stop_time:.3f} s after the trip")
+        if moment.overrun:
+            lines.append("**the stop took longer than declared: the torque can't be had any more**")
+        if moment.refused:
+            lines.append(f"**not switched on: {moment.refused}**")
+        elif moment.state != "on" and moment.violated:
+            lines.append(f"violated now: {', '.join(moment.violated)}")
+        hand = f"pulls with {moment.force:.0f} N" if moment.gripped else "holds nothing"
+        return [*lines, f"the hand {hand}", timing(update, "cycle")]
 
 
 class WalkPlots:
@@ -60,7 +74,7 @@ class WalkPlots:
 
     def __init__(self, gui: viser.GuiApi, keys: Guard) -> None:
         """Adds three plots."""
-        self._rows: deque[tuple[float, ...]] = deque()
+        self._rows = RecentRows()
         self._keys = keys
         self._distance = plot(
             gui, "distance to operator [m], time [s]", _HIGHEST_M, _HEIGHT,
@@ -78,25 +92,20 @@ class WalkPlots:
         )  # fmt: skip
 
     def add(self, moment: Posed) -> None:
-        """One moment more; a time before the last one begins anew."""
+        """One moment more; an earlier time than the last one clears the curves."""
         assert isinstance(moment, WalkMoment)
-        if self._rows and moment.elapsed < self._rows[-1][0]:
-            self._rows.clear()
-        if self._rows and moment.elapsed == self._rows[-1][0]:
-            return
         worst = moment.worst
-        self._rows.append((
-            moment.elapsed, worst.distance, worst.protective, worst.tcp_speed, worst.velocity,
-            worst.speed_ratio, worst.acceleration_ratio,
-        ))  # fmt: skip
-        while self._rows[0][0] < moment.elapsed - SPAN:
-            self._rows.popleft()
+        if moment.elapsed != self._rows.last:
+            self._rows.add(
+                moment.elapsed, worst.distance, worst.protective, worst.tcp_speed, worst.velocity,
+                worst.speed_ratio, worst.acceleration_ratio,
+            )  # fmt: skip
 
     def show(self, *_: float) -> None:
         """Draws what was added."""
-        if len(self._rows) < 2:
+        if not self._rows.drawable:
             return
-        time, distance, iso, tool, towards, speed, acceleration = np.array(self._rows).T
+        time, distance, iso, tool, towards, speed, acceleration = self._rows.columns()
         keys, flat = self._keys, np.ones_like(time)
         self._distance.data = (
             time, np.minimum(distance, _HIGHEST_M), np.minimum(iso, _HIGHEST_M),
@@ -112,28 +121,6 @@ class WalkPlots:
             np.minimum(acceleration, _HIGHEST_SHARE),
             flat,
         )
-
-
-def status(told: Update, moment: WalkMoment, note: str) -> str:
-    """The state of the guard first."""
-    lines = [f"{_state(moment)} at {moment.elapsed:.1f} s{pace(told)}"]
-    if moment.trip:
-        count = "" if moment.trips == 1 else f", {moment.trips} trips so far"
-        when = "last trip" if moment.state == "on" else "tripped"
-        lines.append(f"{when}: **{moment.trip}**{count}")
-        if moment.state == "off":
-            lines.append(f"at rest {moment.stop_time:.3f} s after the trip")
-    if moment.overrun:
-        lines.append("**the stop took longer than declared: the torque can't be had any more**")
-    if moment.refused:
-        lines.append(f"**not switched on: {moment.refused}**")
-    elif moment.state != "on" and moment.violated:
-        lines.append(f"violated now: {', '.join(moment.violated)}")
-    hand = f"pulls with {moment.force:.0f} N" if moment.gripped else "holds nothing"
-    lines += [f"the hand {hand}", timing(told, "cycle")]
-    if note:
-        lines.append(f"**{note}**")
-    return "  \n".join(lines)
 
 
 def _state(moment: WalkMoment) -> str:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -11,25 +12,21 @@ from proxcgal.core import modes
 from proxcgal.core.errors import ConfigError
 from proxcgal.evaluation.metrics import Summary
 from proxcgal.scenario.keys import FAULT_VALUES
-from proxcgal.scenario.loading import load_scenario
+from proxcgal.scenario.loading import Scenario, load_scenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.sim.mount_faults import look
 from proxcgal.sim.source import SimulatedSource
 from proxcgal.sim.world import World
-from proxcgal.study.campaign import Campaign, Trial, plain
+from proxcgal.study.campaign import Campaign, Trial
+from proxcgal.study.campaign_kind import CampaignKind, CampaignRequest
+from proxcgal.study.campaign_plan import CampaignPlan
+from proxcgal.study.campaign_store import Row as Numbers
 from proxcgal.study.faults.cases import ROW_OF, ROWS, TICK_MS, Fault, Row
 from proxcgal.study.faults.figures import figures
 from proxcgal.study.faults.texts import captions, listings, pages, verdicts
-from proxcgal.study.kind import CampaignRequest, Kind
-from proxcgal.study.trials import identity, robot_of, simulate
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from proxcgal.scenario.loading import Scenario
-    from proxcgal.study.jobs import Report
-    from proxcgal.study.store import Row as Numbers
-    from proxcgal.trial.trial import TrialLog
+from proxcgal.study.jobs import ShareReport
+from proxcgal.study.trial_simulation import robot_of, simulate_trial
+from proxcgal.trial.trial import TrialLog
 
 #: Scenes in which the arm moves, and every sensor sees a room.
 SCENES = ("timing_ur10e", "timing_panda")
@@ -52,10 +49,8 @@ def plan(request: CampaignRequest) -> Campaign:
     Raises:
         ProxError: a scene that does not load, or whose sensors do not fit the rows.
     """
-    trials: list[Trial] = []
-    scenes: dict[str, str] = {}
-    robots: set[str] = set()
-    for source in request.scenarios or SCENES:
+    campaign = CampaignPlan("faults", request, SCENES)
+    for source in campaign.scenarios:
         kind = load_scenario(source).kind
         if kind != "static":
             raise ConfigError(
@@ -64,14 +59,8 @@ def plan(request: CampaignRequest) -> Campaign:
             )
         base = load_scenario(source, (*SET, *request.overrides))
         _refuse_short(base)
-        robot = robot_of(base)
-        setup = Setup.of(base, robot)
-        sensors = len(setup.skin)
+        setup = campaign.add_scene(source, base, base.robot, by="with")  # tables are by robot
         mounts = _visible(setup)
-        if plain(base.robot) in robots:  # the table is read by robot
-            raise ConfigError(f"--scenario {source}: there is another one with {base.robot}")
-        robots.add(plain(base.robot))
-        scenes |= identity(base, robot)
         for place, row in enumerate(ROWS):
             for number in range(request.runs):
                 draw = np.random.default_rng([request.seed, number, place])
@@ -80,24 +69,14 @@ def plan(request: CampaignRequest) -> Campaign:
                     faults: Sequence[Fault] = _mount_faults(row, mounts, draw)
                     text = _assignment(faults, 0.0, float(base.duration))
                 else:
-                    faults = row.faults(int(draw.integers(sensors)))
+                    faults = row.faults(int(draw.integers(len(setup.skin))))
                     text = _assignment(faults, onset, onset + row.duration)
                 overrides = (*SET, *row.settings, *request.overrides, text)
-                trials.append(
-                    Trial(
-                        scenario=load_scenario(source, overrides), source=source,
-                        overrides=overrides, controller="wb", seed=request.seed + number,
-                        robot_digest=robot.digest,
-                        tags={"robot": base.robot, "row": row.name, "run": number},
-                    )
+                campaign.add_trial(
+                    load_scenario(source, overrides), source, overrides, "wb", number, setup.robot,
+                    robot=base.robot, row=row.name, run=number,
                 )  # fmt: skip
-    if not trials:
-        raise ConfigError("--runs: no trial is left")
-    description = {
-        "kind": "faults", "seed": request.seed, "scenarios": list(request.scenarios or SCENES),
-        "set": list(request.overrides), **scenes,
-    }  # fmt: skip
-    return Campaign(description=description, trials=trials, perform=perform, columns=COLUMNS)
+    return campaign.campaign(perform, COLUMNS)
 
 
 def _refuse_short(base: Scenario) -> None:
@@ -145,7 +124,7 @@ def _assignment(faults: Any, start: float, end: float) -> str:
     return f"fault=[{', '.join(tables)}]"
 
 
-def perform(trial: Trial, report: Report) -> Numbers:
+def perform(trial: Trial, report: ShareReport) -> Numbers:
     """One trial beside its row's requirements."""
     row = ROW_OF[str(trial.tags["row"])]
     if row.refused:
@@ -160,18 +139,18 @@ def perform(trial: Trial, report: Report) -> Numbers:
     worst = int(log.mode[after].max())
     free = time > onset + row.duration + RECOVERY
     recovered = row.least == modes.STOP or bool((log.mode[free] == modes.RUN).all())
-    told = not row.finding or log.findings.get(row.finding, 0) > 0
+    reported = not row.finding or log.findings.get(row.finding, 0) > 0
     same = not row.same_commands or _same(trial, log, report)
     calm = not ((log.leaked_points > 0) & (log.activation > 0.0)).any()
     in_time = row.least == modes.RUN or latency <= row.within + TICK_MS / 1000.0 + _SLACK
-    right = in_time and worst <= row.most and told and recovered and same
+    right = in_time and worst <= row.most and reported and recovered and same
     right = right and (calm or not row.no_flight)
     return {
         "right": bool(right and np.isfinite(log.qd).all()),
         "latency_ms": 1000.0 * latency if np.isfinite(latency) and row.least > modes.RUN else None,
         "reached": bool(reached.any()),
         "worst_mode": modes.NAMES[worst],
-        "told": told,
+        "told": reported,
         "recovered": recovered,
         "same_commands": same,
         "no_flight": calm,
@@ -179,7 +158,7 @@ def perform(trial: Trial, report: Report) -> Numbers:
     }
 
 
-def _refused(trial: Trial, report: Report) -> Numbers:
+def _refused(trial: Trial, report: ShareReport) -> Numbers:
     """Is that very sensor found before the run, and no other?"""
     setup = Setup.of(trial.scenario, robot_of(trial.scenario, trial.robot_digest))
     source = SimulatedSource(setup, World(setup.robot, setup.scene), trial.seed)
@@ -193,14 +172,14 @@ def _refused(trial: Trial, report: Report) -> Numbers:
     }  # fmt: skip
 
 
-def _same(trial: Trial, log: TrialLog, report: Report) -> bool:
+def _same(trial: Trial, log: TrialLog, report: ShareReport) -> bool:
     """Are the commands those of the same trial without the fault?"""
     other = _simulate(trial, trial.scenario.model_copy(update={"faults": ()}), report)
     return bool(np.array_equal(log.qd, other.qd))
 
 
-def _simulate(trial: Trial, scenario: Scenario, report: Report) -> TrialLog:
-    return simulate(
+def _simulate(trial: Trial, scenario: Scenario, report: ShareReport) -> TrialLog:
+    return simulate_trial(
         scenario, trial.controller, trial.seed, report,
         robot_digest=trial.robot_digest, without_truth=True,
     )  # fmt: skip
@@ -237,7 +216,7 @@ def worst(table: pl.DataFrame) -> list[str]:
     return order["key"].to_list()
 
 
-KIND = Kind(
+KIND = CampaignKind(
     title="Faults",
     introduction="A fault between the world and the controller while the arm moves: what mode "
     "follows, how soon, and whether the arm recovers. Engineering figures from a simulation, not a "

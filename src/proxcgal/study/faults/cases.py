@@ -22,7 +22,7 @@ class Row:
     least: int  # mode that must be reached
     most: int  # mode that must not be exceeded
     within: float  # [s] from the fault's onset
-    finding: str = ""  # that must be told
+    finding: str = ""  # that must be reported
     same_commands: bool = False  # as without the fault, to the bit
     duration: float = 0.6  # [s] of the fault
     settings: Sequence[str] = ()  # of the scenario, beside the campaign's own

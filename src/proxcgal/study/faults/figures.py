@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import polars as pl
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from proxcgal.core.modes import DEGRADED, HOLD, NAMES, RUN, STOP
 from proxcgal.evaluation.metrics import Summary
 from proxcgal.study.faults.cases import ROWS
-from proxcgal.study.figures import DPI, GREY, LEGEND
+from proxcgal.study.plotting import GREY, legend_below, new_figure
 
 COLOURS = {DEGRADED: "#E69F00", HOLD: "#0072B2", STOP: "#333333"}
 
@@ -23,8 +22,7 @@ def figures(table: pl.DataFrame, _: Summary | None = None) -> dict[str, Figure]:
     if not robots:
         return {}
     rows = [row for row in ROWS if row.least > RUN]
-    figure = Figure(figsize=(4.2 * len(robots) + 1.6, 4.6), dpi=DPI, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(4.2 * len(robots) + 1.6, 4.6)
     for ax, robot in zip(
         np.atleast_1d(figure.subplots(1, len(robots), sharey=True)), robots, strict=True
     ):
@@ -52,5 +50,5 @@ def figures(table: pl.DataFrame, _: Summary | None = None) -> dict[str, Figure]:
     handles = [Line2D([], [], color=colour, marker=".", linestyle="", label=NAMES[mode])
                for mode, colour in COLOURS.items()]  # fmt: skip
     handles.append(Line2D([], [], color=GREY, linewidth=2, label="bound"))
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), **LEGEND)
+    legend_below(figure, handles)
     return {"latency.png": figure}

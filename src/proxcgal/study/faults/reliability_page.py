@@ -37,7 +37,7 @@ class Shown:
 
 
 @dataclass(frozen=True, slots=True)
-class Goal:
+class Aim:
     """One of the goals, with its short form and what runs the long one."""
 
     goal: str
@@ -159,39 +159,39 @@ SHOWN: tuple[Shown, ...] = (
 
 GOAL_RUNS = 200  # of each row: with fewer a page says nothing of the goals
 _LONG_CPP = "`./run test --long`"
-GOALS: tuple[Goal, ...] = (
-    Goal("1. 10^6 fuzzed frames", ((_FUZZ, "TwentyThousandRandomTicksKeepEveryPromise"),),
-         f"{_LONG_CPP}; `./run fuzz MINUTES tick`", "no promise broken"),
-    Goal("2. every row, 200 seeds, two robots",
-         (("tests/study/test_faults.py", "test_the_mode_is_right_in_time_and_the_arm_recovers"),),
-         "`proxcgal campaign faults --runs 200`",
-         "as many seeds as the table above has"),
-    Goal("3. no allocation in 10^6 ticks; p99.9; adversarial clouds",
-         ((_CONTROLLER, "TickAllocatesNothing"),), f"{_LONG_CPP}; `./run bench`",
-         "no allocation; times: benchmarks.md"),
-    Goal("4. solver against an independent one, 10^5 stacks",
-         ((_SOLVE_PY, "test_agrees_with_the_formulas_on_random_stacks"),), _LONG_CPP,
-         "as the formulas, within rounding; the first level at its optimum"),
-    Goal("5. 10^6 point and ray queries", ((_MESH, "NearestAgreesWithCgal"),
+GOALS: tuple[Aim, ...] = (
+    Aim("1. 10^6 fuzzed frames", ((_FUZZ, "TwentyThousandRandomTicksKeepEveryPromise"),),
+        f"{_LONG_CPP}; `./run fuzz MINUTES tick`", "no promise broken"),
+    Aim("2. every row, 200 seeds, two robots",
+        (("tests/study/test_faults.py", "test_the_mode_is_right_in_time_and_the_arm_recovers"),),
+        "`proxcgal campaign faults --runs 200`",
+        "as many seeds as the table above has"),
+    Aim("3. no allocation in 10^6 ticks; p99.9; adversarial clouds",
+        ((_CONTROLLER, "TickAllocatesNothing"),), f"{_LONG_CPP}; `./run bench`",
+        "no allocation; times: benchmarks.md"),
+    Aim("4. solver against an independent one, 10^5 stacks",
+        ((_SOLVE_PY, "test_agrees_with_the_formulas_on_random_stacks"),), _LONG_CPP,
+        "as the formulas, within rounding; the first level at its optimum"),
+    Aim("5. 10^6 point and ray queries", ((_MESH, "NearestAgreesWithCgal"),
                                            (_MESH, "FirstHitAgreesWithCgal")), _LONG_CPP,
-         "within 1e-9 m"),
-    Goal("6. 1000 kills; a log cut at every byte",
-         ((_RECORDING, "test_20_killed_writers_lose_no_acknowledged_tick"),
+        "within 1e-9 m"),
+    Aim("6. 1000 kills; a log cut at every byte",
+        ((_RECORDING, "test_20_killed_writers_lose_no_acknowledged_tick"),
           (_RECORDING, "test_a_file_cut_anywhere_gives_all_ticks_before_the_cut")),
-         _LONG_CPP,
-         "1000 kills: no acknowledged tick lost; cut at every byte: all ticks before it read"),
-    Goal("7. replays bit-identical",
-         (("tests/trial/test_trial.py",
+        _LONG_CPP,
+        "1000 kills: no acknowledged tick lost; cut at every byte: all ticks before it read"),
+    Aim("7. replays bit-identical",
+        (("tests/trial/test_trial.py",
            "test_a_replay_gives_every_recorded_answer_again_bit_for_bit"),), _LONG_CPP,
-         "every answer, to the bit"),
-    Goal("8. ASan, UBSan, TSan clean, with and without NDEBUG",
-         ((_FUZZ, "TwentyThousandRandomTicksKeepEveryPromise"),),
-         "`./run check --asan-ubsan`, `--tsan`; CI: `./run check --asan-ubsan --short`",
-         "clean, with and without assertions"),
-    Goal("9. outward recovery", ((_CONTACT, "FromContactAndFromInsideEveryCommandLeadsOut"),),
-         _LONG_CPP,
-         "each of 16118 commands leads out; after 1 ms 16 were nearer, by up to 0.1 mm, to another "
-         "face of the mesh"),
+        "every answer, to the bit"),
+    Aim("8. ASan, UBSan, TSan clean, with and without NDEBUG",
+        ((_FUZZ, "TwentyThousandRandomTicksKeepEveryPromise"),),
+        "`./run check --asan-ubsan`, `--tsan`; CI: `./run check --asan-ubsan --short`",
+        "clean, with and without assertions"),
+    Aim("9. outward recovery", ((_CONTACT, "FromContactAndFromInsideEveryCommandLeadsOut"),),
+        _LONG_CPP,
+        "each of 16118 commands leads out; after 1 ms 16 were nearer, by up to 0.1 mm, to another "
+        "face of the mesh"),
 )  # fmt: skip
 
 _HEAD = """\
@@ -217,7 +217,9 @@ where the onset and the sensors' rate alone decide, their latencies are the same
 """
 
 
-def page(rows: tuple[Row, ...], summary: dict[str, Any], required: dict[str, str]) -> str:
+def reliability_page(
+    rows: tuple[Row, ...], summary: dict[str, Any], required: dict[str, str]
+) -> str:
     """The whole page.
 
     Args:
@@ -225,52 +227,52 @@ def page(rows: tuple[Row, ...], summary: dict[str, Any], required: dict[str, str
         summary: of a faults campaign.
         required: mode that each row asks for, by name.
     """
-    robots = summary["robots"]
-    lines = [_HEAD]
-    runs_a_row = counted(summary.get("runs", 0), "run")
+    robots, runs_a_row = summary["robots"], summary.get("runs", 0)
     runs = sum(found["runs"] for own in robots.values() for found in own.values())
-    lines.append(
+    lines = [
+        _HEAD,
         f"{summary['right']} of {runs} runs were right: "
         + "; ".join(f"{len(own)} rows on {robot}" for robot, own in robots.items())
-        + f", seeds from {summary.get('seed', 0)} on, {runs_a_row} a row.\n"
-    )
+        + f", seeds from {summary.get('seed', 0)} on, {counted(runs_a_row, 'run')} a row.\n",
+    ]
     if failed := len(summary.get("failed", ())):
         lines.append(f"{failed} more runs did not come to their end and are not counted.\n")
-    lines.append(
-        "| fault | required | bound ms | robot | right | median ms | worst ms | farthest |"
-    )
-    lines.append("|---|---|---|---|---|---|---|---|")
-    for row in rows:
-        bound = f"{1000 * row.within:.0f}" if row.least > RUN and not row.refused else "-"
-        for robot, own in robots.items():
-            if row.name not in own:
-                continue
-            found = own[row.name]
-            modes = ", ".join(f"{mode} {n}" for mode, n in found["worst_modes"].items())
-            lines.append(
-                f"| {row.name} | {required[row.name]} | {bound} | {robot} | {found['right']} of "
-                f"{found['runs']} | {whole_ms(found['latency_median_ms'])} | "
-                f"{whole_ms(found['latency_max_ms'])} | {modes} |"
-            )
-    lines += ["", _LIMITS, "## Shown by tests", "", "| what goes wrong | what happens | shown by |"]
-    lines.append("|---|---|---|")
-    lines += [f"| {s.fault} | {s.required} | {_tests(s.tests)} |" for s in SHOWN]
-    if (runs := summary.get("runs", 0)) < GOAL_RUNS:
-        lines += [
-            "",
-            "What the long tests gave on the state that is published is in docs/reliability.md, "
-            f"which takes {GOAL_RUNS} runs a row; here: {runs}.",
-        ]
-        return "\n".join(lines) + "\n"
     lines += [
+        "| fault | required | bound ms | robot | right | median ms | worst ms | farthest |",
+        "|---|---|---|---|---|---|---|---|",
+        *(
+            _line(row, required[row.name], robot, own[row.name])
+            for row in rows
+            for robot, own in robots.items()
+            if row.name in own
+        ),
+        "", _LIMITS, "## Shown by tests", "", "| what goes wrong | what happens | shown by |",
+        "|---|---|---|",
+        *(f"| {s.fault} | {s.required} | {_tests(s.tests)} |" for s in SHOWN),
         "",
-        "## Goals",
-        "",
-        "| goal | short form, in the tests | long form | it gave |",
-        "|---|---|---|---|",
-    ]
-    lines += [f"| {g.goal} | {_tests(g.tests)} | {g.long} | {g.gave or '-'} |" for g in GOALS]
-    return "\n".join(lines) + "\n" + _END
+    ]  # fmt: skip
+    if runs_a_row < GOAL_RUNS:
+        lines.append(
+            "What the long tests gave on the state that is published is in docs/reliability.md, "
+            f"which takes {GOAL_RUNS} runs a row; here: {runs_a_row}.\n"
+        )
+    else:
+        lines += [
+            "## Goals", "", "| goal | short form, in the tests | long form | it gave |",
+            "|---|---|---|---|",
+            *(f"| {g.goal} | {_tests(g.tests)} | {g.long} | {g.gave or '-'} |" for g in GOALS),
+            _END,
+        ]  # fmt: skip
+    return "\n".join(lines)
+
+
+def _line(row: Row, required: str, robot: str, found: dict[str, Any]) -> str:
+    bound = f"{1000 * row.within:.0f}" if row.least > RUN and not row.refused else "-"
+    modes = ", ".join(f"{mode} {n}" for mode, n in found["worst_modes"].items())
+    return (
+        f"| {row.name} | {required} | {bound} | {robot} | {found['right']} of {found['runs']} | "
+        f"{whole_ms(found['latency_median_ms'])} | {whole_ms(found['latency_max_ms'])} | {modes} |"
+    )
 
 
 _LIMITS = """\

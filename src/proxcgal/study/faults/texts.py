@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from proxcgal.core import modes
 from proxcgal.evaluation.metrics import Summary
 from proxcgal.study.faults.cases import ROW_OF, ROWS, TICK_MS, Row
-from proxcgal.study.faults.reliability_page import page, whole_ms
-from proxcgal.study.kind import Listing
+from proxcgal.study.faults.reliability_page import reliability_page, whole_ms
+from proxcgal.study.listing import Listing
 
 
 def listings(summary: Summary) -> list[Listing]:
     """Row, robot, runs, right mode, latency, worst."""
-    lines = []
-    for robot, rows in summary["robots"].items():
-        for name, found in rows.items():
-            row = ROW_OF[name]
-            bound = f"{1000 * row.within:.0f} + {TICK_MS}" if row.least > modes.RUN else "-"
-            lines.append(
-                (
-                    name, robot, _required(row), str(found["runs"]), str(found["right"]),
-                    whole_ms(found["latency_median_ms"]), whole_ms(found["latency_max_ms"]), bound,
-                    ", ".join(f"{mode} {n}" for mode, n in found["worst_modes"].items()),
-                )
-            )  # fmt: skip
+    rows = [
+        (
+            name, robot, _required(row := ROW_OF[name]), str(found["runs"]), str(found["right"]),
+            whole_ms(found["latency_median_ms"]), whole_ms(found["latency_max_ms"]),
+            f"{1000 * row.within:.0f} + {TICK_MS}" if row.least > modes.RUN else "-",
+            ", ".join(f"{mode} {n}" for mode, n in found["worst_modes"].items()),
+        )
+        for robot, own in summary["robots"].items()
+        for name, found in own.items()
+    ]  # fmt: skip
     return [
         Listing(
             caption="Every fault lasts 0.6 s (one missed deadline, a joint state that is not a "
@@ -34,7 +34,7 @@ def listings(summary: Summary) -> list[Listing]:
             names=("fault", "robot", "required", "runs", "right", "median", "worst", "bound",
                    "farthest mode"),
             units=("", "", "", "", "", "ms", "ms", "ms", "runs"),
-            rows=lines, left=3,
+            rows=rows, left=3,
         )
     ]  # fmt: skip
 
@@ -47,7 +47,7 @@ def _required(row: Row) -> str:
     return f"{modes.NAMES[row.least]} or {modes.NAMES[row.most]}"
 
 
-def verdicts(summary: Summary) -> list[str]:
+def verdicts(summary: Summary) -> Iterator[str]:
     """How many were right, and which rows were not."""
     wrong = [
         f"{name} on {robot} ({found['right']} of {found['runs']})"
@@ -56,8 +56,9 @@ def verdicts(summary: Summary) -> list[str]:
         if found["right"] < found["runs"]
     ]
     runs = sum(found["runs"] for rows in summary["robots"].values() for found in rows.values())
-    told = [f"The behaviour was right in {summary['right']} of {runs} runs."]
-    return [*told, "Not always right: " + "; ".join(wrong) + "."] if wrong else told
+    yield f"The behaviour was right in {summary['right']} of {runs} runs."
+    if wrong:
+        yield "Not always right: " + "; ".join(wrong) + "."
 
 
 def captions(summary: Summary) -> dict[str, str]:
@@ -70,4 +71,5 @@ def captions(summary: Summary) -> dict[str, str]:
 
 def pages(summary: Summary) -> dict[str, str]:
     """What docs/reliability.md is a copy of."""
-    return {"reliability.md": page(ROWS, summary, {row.name: _required(row) for row in ROWS})}
+    required = {row.name: _required(row) for row in ROWS}
+    return {"reliability.md": reliability_page(ROWS, summary, required)}

@@ -3,33 +3,38 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import polars as pl
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from proxcgal.evaluation.metrics import Summary
 from proxcgal.study.bootstrap import mean_interval
-from proxcgal.study.figures import COLOURS, DASHED, DPI, GREY, LEGEND, NAMES, mark_signals
 from proxcgal.study.hri.metrics import (
     SAMPLE_S,
     compared,
-    paired_differences,
     phase_rows,
     series,
     subject_means,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from proxcgal.evaluation.metrics import Summary
+from proxcgal.study.paired import pairs
+from proxcgal.study.plotting import (
+    CONTROLLER_COLOURS,
+    CONTROLLER_NAMES,
+    DASHED,
+    DOTTED,
+    GREY,
+    legend_below,
+    mark_signals,
+    mark_thresholds,
+    new_figure,
+    tidy_axes,
+)
 
 Paper = Mapping[str, Mapping[str, tuple[float, float]]]  # mean and sigma_max [m]
-_DOTTED: Any = (0, (1, 1.5))
 _HIGHEST = 1.35  # [m] of a distance axis: beyond the sensors' workspace
 _LABELS = {
     "task1": "Task 1", "task2": "Task 2", "H3_first": "H3, first run",
@@ -54,18 +59,6 @@ def figures(table: pl.DataFrame, summary: Summary | None = None) -> dict[str, Fi
     }
 
 
-def _figure(width: float, height: float) -> Figure:
-    figure = Figure(figsize=(width, height), dpi=DPI, layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
-
-
-def _tidy(axes: Iterable[Axes]) -> None:
-    for ax in axes:
-        ax.tick_params(labelsize=9)
-        ax.spines[["top", "right"]].set_visible(False)
-
-
 def _trials(main: pl.DataFrame) -> Figure:
     """[WA] Fig. 9: a trial with the baseline and one with the whole body."""
     task = main["task"].unique(maintain_order=True).to_list()[-1]
@@ -77,8 +70,7 @@ def _trials(main: pl.DataFrame) -> Figure:
     if not both:  # each with other subjects: one controller alone can be shown
         names, both = names[:1], met[0]
     subject = min(both)
-    figure = _figure(5.2 * len(names), 5.0)
-    figure.suptitle(f"{_LABELS.get(task, task)}, subject {subject}", fontsize=12, fontweight="bold")
+    figure = new_figure(5.2 * len(names), 5.0, f"{_LABELS.get(task, task)}, subject {subject}")
     grid = figure.subplots(
         2, len(names), sharex=True, sharey="row", height_ratios=(2.6, 1.0), squeeze=False
     )
@@ -87,27 +79,22 @@ def _trials(main: pl.DataFrame) -> Figure:
         _trial(grid[:, column], trial, name, "abcd"[column])
     grid[0, 0].set_ylabel("minimum distance [m]", fontsize=10)
     grid[1, 0].set_ylabel("activation [-]", fontsize=10)
-    handles = [
-        Line2D([], [], color=GREY, linewidth=1.4),
-        Line2D([], [], color=GREY, linewidth=1.4, linestyle=DASHED),
-    ]
-    figure.legend(handles, ["seen", "true"], loc="outside lower center", ncols=2, **LEGEND)
+    styles: tuple[tuple[str, Any], ...] = (("seen", "-"), ("true", DASHED))
+    legend_below(
+        figure,
+        [Line2D([], [], color=GREY, linewidth=1.4, linestyle=s, label=n) for n, s in styles],
+    )
     return figure
 
 
 def _trial(axes: Any, trial: pl.DataFrame, name: str, letter: str) -> None:
     top, bottom = axes
-    _tidy((top, bottom))
-    colour = COLOURS.get(name, "black")
+    tidy_axes(top, bottom)
+    colour = CONTROLLER_COLOURS.get(name, "black")
     seen, true = series(trial, "seen_m")[0], series(trial, "true_m")[0]
     time = np.arange(len(seen)) * SAMPLE_S
     d_min, buffer = float(trial["d_min_m"][0]), float(trial["buffer_m"][0])
-    for level, label in ((d_min, r"$d_{min}$"), (d_min + buffer, r"$d_{min}+\Delta$")):
-        top.axhline(level, color=GREY, linewidth=1.0, linestyle=_DOTTED)
-        top.annotate(
-            label, (1.0, level), xycoords=("axes fraction", "data"), xytext=(3, 0),
-            textcoords="offset points", va="center", fontsize=8, color=GREY,
-        )  # fmt: skip
+    mark_thresholds(top, d_min, buffer, offset=3, fontsize=8)
     top.fill_between(
         time, 0.0, 1.0, where=~np.isfinite(seen), transform=top.get_xaxis_transform(),
         color=GREY, alpha=0.12, linewidth=0.0,
@@ -115,58 +102,53 @@ def _trial(axes: Any, trial: pl.DataFrame, name: str, letter: str) -> None:
     top.plot(time, seen, color=colour, linewidth=1.2)
     top.plot(time, true, color=colour, linewidth=1.2, linestyle=DASHED)
     top.set_ylim(0.0, _HIGHEST)
-    top.set_title(f"({letter}) {NAMES.get(name, name)}", loc="left", fontsize=10)
+    top.set_title(f"({letter}) {CONTROLLER_NAMES.get(name, name)}", loc="left", fontsize=10)
     bottom.plot(time, series(trial, "activation")[0], color=colour, linewidth=1.2)
-    bottom.set_ylim(-0.05, 1.08)
-    bottom.set_xlim(0.0, time[-1])
-    bottom.set_xlabel("time [s]", fontsize=10)
+    bottom.set(ylim=(-0.05, 1.08), xlim=(0.0, time[-1]), xlabel="time [s]")
     mark_signals((top, bottom), json.loads(trial["signals"][0]))
 
 
 def _cycles(main: pl.DataFrame) -> Figure:
     tasks = main["task"].unique(maintain_order=True).to_list()
-    figure = _figure(8.4, 3.1 * len(tasks) + 0.3)
+    figure = new_figure(8.4, 3.1 * len(tasks) + 0.3)
     axes = figure.subplots(len(tasks), 1, sharex=True, squeeze=False)[:, 0]
-    _tidy(axes)
+    tidy_axes(*axes)
     for ax, task in zip(axes, tasks, strict=True):
         own = main.filter(pl.col("task") == task)
         for (name,), part in own.group_by(["controller"], maintain_order=True):
             true = series(part, "true_m")
             time = np.arange(true.shape[1]) * SAMPLE_S
-            mean, colour = true.mean(axis=0), COLOURS.get(str(name), "black")
+            mean, colour = true.mean(axis=0), CONTROLLER_COLOURS.get(str(name), "black")
             over = _OVER.get(str(name), 2)
             ax.plot(
                 time, mean, color=colour, linewidth=1.6 if over > 2 else 1.0, zorder=over,
-                label=NAMES.get(str(name), str(name)),
+                label=CONTROLLER_NAMES.get(str(name), str(name)),
             )  # fmt: skip
             if over > 2 and len(true) > 1:
                 spread = true.std(axis=0, ddof=1)  # as sigma_max of the tables
                 ax.fill_between(
                     time, mean - spread, mean + spread, color=colour, alpha=0.16, linewidth=0.0
                 )
-        ax.set_ylim(0.0, _HIGHEST)
-        ax.set_xlim(0.0, time[-1])
+        ax.set(ylim=(0.0, _HIGHEST), xlim=(0.0, time[-1]), ylabel="true distance [m]")
         ax.set_title(_LABELS.get(task, task), loc="left", fontsize=10, fontweight="bold")
-        ax.set_ylabel("true distance [m]", fontsize=10)
         mark_signals((ax,), json.loads(own["signals"][0]))
     axes[-1].set_xlabel("time [s]", fontsize=10)
-    handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), **LEGEND)
+    legend_below(figure, axes[0].get_legend_handles_labels()[0])
     return figure
 
 
 def _subjects(main: pl.DataFrame, paper: Paper) -> Figure:
     rows = phase_rows(main)
     names = main["controller"].unique(maintain_order=True).to_list()
-    figure = _figure(max(1.45 * len(rows) + 2.0, 8.6), 3.9)
+    figure = new_figure(max(1.45 * len(rows) + 2.0, 8.6), 3.9)
     ax = figure.subplots()
-    _tidy((ax,))
+    tidy_axes(ax)
     for place, row in enumerate(rows):
         for at, name in enumerate(names):
             x = place + 0.8 * ((at + 0.5) / len(names) - 0.5)
             values = np.array(list(subject_means(main, row).get(name, {}).values()))
             spread = np.linspace(-0.05, 0.05, len(values))
-            colour = COLOURS.get(name, "black")
+            colour = CONTROLLER_COLOURS.get(name, "black")
             ax.plot(x + spread, values, ".", color=colour, markersize=4, alpha=0.55)
             if len(values):
                 ax.plot([x - 0.08, x + 0.08], [values.mean()] * 2, color=colour, linewidth=2.4)
@@ -177,32 +159,37 @@ def _subjects(main: pl.DataFrame, paper: Paper) -> Figure:
             if printed is not None:
                 ax.plot([x], [printed[0]], "x", color="black", markersize=6)
     ax.set_xticks(range(len(rows)), [_LABELS.get(row, row) for row in rows])
-    ax.set_ylim(bottom=0.0)
-    ax.set_ylabel("mean distance of a subject [m]", fontsize=10)
+    ax.set(ylim=(0.0, None), ylabel="mean distance of a subject [m]")
     handles = [
-        Line2D([], [], color=COLOURS.get(name, "black"), marker=".", linewidth=2.0)
+        Line2D(
+            [], [], color=CONTROLLER_COLOURS.get(name, "black"), marker=".", linewidth=2.0,
+            label=CONTROLLER_NAMES.get(name, name),
+        )
         for name in names
-    ]
-    handles.append(Line2D([], [], color=GREY, marker="D", linestyle="", fillstyle="none"))
-    labels = [*(NAMES.get(name, name) for name in names), "ours, seen"]
+    ]  # fmt: skip
+    plain: dict[str, Any] = {"linestyle": "", "fillstyle": "none"}
+    handles.append(Line2D([], [], color=GREY, marker="D", label="ours, seen", **plain))
     if any(name in paper.get(row, {}) for row in rows for name in names):
-        handles.append(Line2D([], [], color="black", marker="x", linestyle=""))
-        labels.append("the paper's (seen)")
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), **LEGEND)
+        handles.append(_printed_handle("black"))
+    legend_below(figure, handles)
     return figure
+
+
+def _printed_handle(colour: str) -> Line2D:
+    return Line2D([], [], color=colour, marker="x", linestyle="", label="the paper's (seen)")
 
 
 def _differences(done: pl.DataFrame, paper: Paper) -> Figure:
     rows = phase_rows(done)
     layouts = done["layout"].unique(maintain_order=True).to_list()
-    figure = _figure(1.35 * len(rows) + 1.6, 3.7)
+    figure = new_figure(1.35 * len(rows) + 1.6, 3.7)
     ax = figure.subplots()
-    _tidy((ax,))
+    tidy_axes(ax)
     colours = {"main": "#333333", "jittered": "#CC79A7"}
     for place, row in enumerate(rows):
         for at, layout in enumerate(layouts):
             own = done.filter(pl.col("layout") == layout)
-            apart = paired_differences(subject_means(own, row), "wb", "sm")
+            apart = pairs(subject_means(own, row), "wb", "sm").apart_mm
             interval = mean_interval(apart)
             if interval is None:
                 continue
@@ -222,16 +209,15 @@ def _differences(done: pl.DataFrame, paper: Paper) -> Figure:
                 [place], [1000.0 * (printed["wb"][0] - printed["sm"][0])], "x", color="#0072B2",
                 markersize=7,
             )  # fmt: skip
-    ax.axhline(0.0, color=GREY, linewidth=1.0, linestyle=_DOTTED)
+    ax.axhline(0.0, color=GREY, linewidth=1.0, linestyle=DOTTED)
     ax.set_xticks(range(len(rows)), [_LABELS.get(row, row) for row in rows])
     ax.set_ylabel("WB \N{MINUS SIGN} SM, mean true distance [mm]", fontsize=10)
-    handles = [
-        Line2D([], [], color=colours[layout], marker="o", linestyle="") for layout in layouts
-    ]
     names = {"main": "the cell as it is", "jittered": "positions moved"}
-    labels = [names[layout] for layout in layouts]
+    handles = [
+        Line2D([], [], color=colours[layout], marker="o", linestyle="", label=names[layout])
+        for layout in layouts
+    ]
     if any(row in paper for row in rows):
-        handles.append(Line2D([], [], color="#0072B2", marker="x", linestyle=""))
-        labels.append("the paper's (seen)")
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), **LEGEND)
+        handles.append(_printed_handle("#0072B2"))
+    legend_below(figure, handles)
     return figure

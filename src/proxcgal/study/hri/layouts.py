@@ -1,4 +1,4 @@
-"""The human study's cell with every position moved a little, so that nobody trusts one layout."""
+"""The cell of the human study with every position moved a little, for results beyond one layout."""
 
 from __future__ import annotations
 

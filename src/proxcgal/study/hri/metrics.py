@@ -13,9 +13,10 @@ from proxcgal.evaluation.metrics import SELF_LIMIT_M, Summary
 from proxcgal.evaluation.phases import SAMPLES_HZ
 from proxcgal.study.bootstrap import mean_interval
 from proxcgal.study.campaign import Campaign
+from proxcgal.study.paired import Distances, by_controller, pairs
 
 #: [WA] Tables I and II: mean and sigma_max [m] by row and controller.
-PAPER = {
+PAPER_MEANS = {
     "task1": {"sm": (0.331, 0.129), "wb": (0.339, 0.126)},
     "task2": {"sm": (0.285, 0.189), "wb": (0.310, 0.167)},
     "H1": {"sm": (0.312, 0.099), "wb": (0.327, 0.111)},
@@ -74,7 +75,9 @@ def _layout(table: pl.DataFrame) -> Summary:
         phase: _cell(by_task[task], phase, window) for (task, phase), window in phases.items()
     }
     paired = {row: _paired(subject_means(table, row)) for row in phase_rows(table)}
-    least = {task: _paired(subject_least(table, task)) for task in tasks}
+    least = {
+        task: _paired(by_controller(own, "true_min_m", "subject")) for task, own in by_task.items()
+    }
     close = {
         str(name): int(part["too_close_ticks"].sum())
         for (name,), part in table.group_by(["controller"], maintain_order=True)
@@ -111,8 +114,8 @@ def _cell(own: pl.DataFrame, row: str, window: tuple[float, float] | None = None
         if window is None:
             means, seen = part["mean_m"].to_list(), part["seen_mean_m"].to_list()
         else:
-            pairs = [json.loads(text)[row] for text in part["phase_means"]]
-            means, seen = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
+            of_row = [json.loads(text)[row] for text in part["phase_means"]]
+            means, seen = [both[0] for both in of_row], [both[1] for both in of_row]
         out[str(name)] = {
             "mean_m": _mean(means),
             "sigma_max_m": _sigma_max(series(part, "true_m"), window),
@@ -152,12 +155,9 @@ def phase_rows(table: pl.DataFrame) -> list[str]:
     return [*firsts["task"].to_list(), *phases]
 
 
-Subjects = dict[str, dict[int, float]]  # a number of each subject [m], by controller
-
-
-def subject_means(table: pl.DataFrame, row: str, *, seen: bool = False) -> Subjects:
+def subject_means(table: pl.DataFrame, row: str, *, seen: bool = False) -> Distances:
     """Mean true or seen distance in a task or phase."""
-    found: Subjects = {}
+    found: dict[str, dict[int, float]] = {}
     whole = "seen_mean_m" if seen else "mean_m"
     columns = ("controller", "subject", "task", whole, "phase_means")
     for controller, subject, task, mean, text in table.select(columns).iter_rows():
@@ -167,25 +167,10 @@ def subject_means(table: pl.DataFrame, row: str, *, seen: bool = False) -> Subje
     return found
 
 
-def subject_least(table: pl.DataFrame, task: str) -> Subjects:
-    """Least true distance in a task."""
-    found: Subjects = {}
-    own = table.filter(pl.col("task") == task)
-    for controller, subject, least in own.select("controller", "subject", "true_min_m").iter_rows():
-        found.setdefault(controller, {})[subject] = least
-    return found
-
-
-def paired_differences(values: Subjects, one: str, other: str) -> list[float]:
-    """Over the subjects that both controllers met [mm]."""
-    first, second = values.get(one, {}), values.get(other, {})
-    return [1000.0 * (first[s] - second[s]) for s in sorted(first.keys() & second.keys())]
-
-
-def _paired(values: Subjects) -> Summary:
+def _paired(distances: Distances) -> Summary:
     found = {}
     for one, other in COMPARISONS:
-        apart = paired_differences(values, one, other)
+        apart = pairs(distances, one, other).apart_mm
         interval = mean_interval(apart)
         if interval is not None:
             found[f"{one}-{other}"] = {
@@ -196,12 +181,14 @@ def _paired(values: Subjects) -> Summary:
 
 
 def compared(summary: Summary) -> dict[str, dict[str, tuple[float, float]]]:
-    """`PAPER`, of the rows that come from the paper's own cell."""
-    rows = summary.get("compared", PAPER)
-    return {row: cell for row, cell in PAPER.items() if row in rows}
+    """`PAPER_MEANS`, of the rows that come from the paper's own cell."""
+    rows = summary.get("compared", PAPER_MEANS)
+    return {row: cell for row, cell in PAPER_MEANS.items() if row in rows}
 
 
-def held(layout: Summary, rows: Collection[str] = tuple(PAPER)) -> list[tuple[str, bool, str]]:
+def held(
+    layout: Summary, rows: Collection[str] = tuple(PAPER_MEANS)
+) -> list[tuple[str, bool, str]]:
     """Every bound of the experiment on one layout: what, whether it holds, the figures.
 
     Args:

@@ -1,240 +1,59 @@
-"""What the human study amounts to, for people: the paper's tables, sentences, captions."""
+"""Texts of the human study: verdicts, introduction, captions."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Iterator
 
-from proxcgal.evaluation.metrics import SELF_LIMIT_M, Summary, counted, shown
+from proxcgal.evaluation.metrics import SELF_LIMIT_M, Summary, counted
 from proxcgal.study.hri.metrics import compared, held
-from proxcgal.study.kind import Listing
+from proxcgal.study.hri.paper_tables import ROW_NAMES, layouts
 
-_LAYOUTS = {"main": "the cell as it is", "jittered": "all positions moved by up to 0.1 m"}
-_ROWS = {
-    "task1": "Assembly Task 1", "task2": "Assembly Task 2", "H1": "Assembly Operation on H1",
-    "H2": "Assembly Operation on H2", "H3_first": "Assembly Operation on H3 (first run)",
-    "H3_second": "Assembly Operation on H3 (second run)",
-}  # fmt: skip
 _FEW = 6  # subjects: fewer give no verdict
-_SETTINGS = (
-    ("d_min", "m"), ("buffer", "m"), ("avoid_gain", "1/s"), ("nearest", ""), ("reach_gain", "1/s"),
-    ("max_linear", "m/s"), ("max_angular", "rad/s"), ("tasks", ""),
-)  # fmt: skip
 
 
-def listings(summary: Summary) -> list[Listing]:
-    """Tables I and II beside the paper's, differences, close calls, settings."""
-    found = []
-    paper = compared(summary)
-    for layout, numbers in _layouts(summary):
-        where = _LAYOUTS[layout]
-        for table, title in (("table1", "Table I, whole cycles"), ("table2", "Table II, phases")):
-            if not numbers[table]:
-                continue
-            found.append(
-                Listing(
-                    caption=f"{title}; {where}. Mean of the least distance, and the largest "
-                    "standard deviation over subjects at one time. Seen: filtered cloud to robot, "
-                    "the paper's own measure; true: exact meshes against the human's exact "
-                    "surface.",
-                    names=(
-                        "controller",
-                        "row",
-                        "seen mean",
-                        "seen sigma",
-                        "paper mean",
-                        "paper sigma",
-                        "ours - paper",
-                        "true mean",
-                        "true sigma",
-                    ),
-                    units=("", "", "m", "m", "m", "m", "m", "m", "m"),
-                    rows=list(_table(numbers[table], paper)),
-                    left=2,
-                )
-            )
-        found.append(
-            Listing(
-                caption=f"Paired over the subjects, true means, and least true distances; {where}. "
-                "95 % bootstrap interval of the mean difference. The paper gives no intervals; its "
-                "difference stands beside. An arm that is kept from a way point waits before it "
-                "for up to 10 s, one that gets there turns back to the far one: a mean over time "
-                "pays for waiting.",
-                names=(
-                    "row",
-                    "comparison",
-                    "pairs",
-                    "difference",
-                    "95 % from",
-                    "to",
-                    "above 0",
-                    "paper",
-                ),
-                units=("", "", "", "mm", "mm", "mm", "%", "mm"),
-                rows=[
-                    *_paired(numbers["paired_mm"], paper),
-                    *_paired(numbers["paired_least_mm"], {}, "{}, least"),
-                ],
-                left=2,
-            )
-        )
-        found.append(
-            Listing(
-                caption=f"Close calls; {where}. Too close: true distance under 0.05 m. Blind: "
-                "then the cloud's nearest point was more than 0.05 m farther away than the human, "
-                "or there was none.",
-                names=(
-                    "controller",
-                    "trials",
-                    "too close",
-                    "ticks",
-                    "blind",
-                    "ticks",
-                    "least",
-                    "empty cloud",
-                    "held",
-                ),
-                units=(
-                    "",
-                    "",
-                    "trials",
-                    "ticks",
-                    "trials",
-                    "ticks",
-                    "m",
-                    "% of ticks",
-                    "% of ticks",
-                ),
-                rows=list(_close(numbers["close_calls"])),
-                left=1,
-            )
-        )
-    names = list(summary["close_calls"])
-    found.append(
-        Listing(
-            caption="Settings: one set for all controllers. They differ in the control point "
-            "alone (sm: the sensors' mounting points), in what they are given (wb_known: points "
-            "of the human itself) and in what they remember (wb_memory).",
-            names=("setting", *names),
-            units=("", *("" for _ in names)),
-            rows=[
-                *(
-                    (f"{key} [{unit}]" if unit else key, *(_setting(summary, key) for _ in names))
-                    for key, unit in _SETTINGS
-                ),
-                ("x_o of eq. (4)", *(_velocity(summary, name) for name in names)),
-            ],
-            left=1,
-        )
-    )
-    return found
-
-
-def _layouts(summary: Summary) -> Iterator[tuple[str, Summary]]:
-    yield "main", summary
-    if summary["jittered"] is not None:
-        yield "jittered", summary["jittered"]
-
-
-def _table(table: Mapping[str, Any], paper: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
-    for row, controllers in table.items():
-        for name, cell in controllers.items():
-            mean, sigma = paper.get(row, {}).get(name, (None, None))
-            apart = "-"
-            if mean is not None and cell["seen_mean_m"] is not None:
-                apart = f"{cell['seen_mean_m'] - mean:+.3f}"
-            yield (
-                name, _ROWS.get(row, row), shown(cell["seen_mean_m"]),
-                shown(cell["seen_sigma_max_m"]), shown(mean), shown(sigma), apart,
-                shown(cell["mean_m"]), shown(cell["sigma_max_m"]),
-            )  # fmt: skip
-
-
-def _paired(
-    paired: Mapping[str, Any], paper: Mapping[str, Any], form: str = "{}"
-) -> Iterator[tuple[str, ...]]:
-    for row, comparisons in paired.items():
-        for name, pair in comparisons.items():
-            one, other = name.split("-")
-            cell = paper.get(row, {})
-            printed = "-"
-            if one in cell and other in cell:
-                printed = f"{1000.0 * (cell[one][0] - cell[other][0]):+.0f}"
-            lengths = (f"{pair[key]:+.1f}" for key in ("mean", "low", "high"))
-            yield (
-                form.format(_ROWS.get(row, row)), f"{one} - {other}", str(pair["pairs"]), *lengths,
-                f"{100.0 * pair['positive_share']:.0f}", printed,
-            )  # fmt: skip
-
-
-def _close(calls: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
-    for name, numbers in calls.items():
-        yield (
-            name, str(numbers["trials"]), str(numbers["too_close_trials"]),
-            str(numbers["too_close_ticks"]), str(numbers["blind_trials"]),
-            str(numbers["blind_ticks"]), shown(numbers["true_min_m"]),
-            *(f"{100.0 * numbers[key] / max(numbers['ticks'], 1):.1f}"
-              for key in ("empty_ticks", "held_ticks")),
-        )  # fmt: skip
-
-
-def _setting(summary: Summary, key: str) -> str:
-    value = summary["settings"][key]
-    return " > ".join(value) if isinstance(value, list) else f"{value:g}"
-
-
-def _velocity(summary: Summary, name: str) -> str:
-    """Where a controller has the obstacle's velocity from."""
-    if name == "wb_known":
-        return "known"
-    return "estimated" if name in summary["settings"]["motion"]["controllers"] else "0"
-
-
-def verdicts(summary: Summary) -> list[str]:
+def verdicts(summary: Summary) -> Iterator[str]:
     """What holds of the experiment's bounds and what does not; what else is to be known."""
-    told: list[str] = []
-    for layout, numbers in _layouts(summary):
-        told += _apart(summary, layout, numbers)
+    for layout, numbers in layouts(summary):
+        yield from _apart(summary, layout, numbers)
         for what, holds, figures in held(numbers, compared(summary)):
             word = "holds" if holds else "DOES NOT HOLD"
             if summary["subjects"] < _FEW:
                 word = "too few subjects for a verdict"
-            told.append(f"{layout}: {what}: {word} ({figures}).")
+            yield f"{layout}: {what}: {word} ({figures})."
         calls = numbers["close_calls"]
         for name in ("wb", "sm"):
             if calls.get(name, {}).get("too_close_trials"):
                 c = calls[name]
-                told.append(
+                yield (
                     f"{layout}: {name} came under 0.05 m in {c['too_close_trials']} of "
                     f"{c['trials']} trials, {c['too_close_ticks']} ticks, of which "
                     f"{c['blind_ticks']} in a blind spot (the paper saw two such failures in 80 "
                     "trials)."
                 )
     if summary["not_finite"] or summary["limits_violated"]:
-        told.append(
+        yield (
             f"Trials with a command that is not finite: {summary['not_finite']}; with a violated "
             f"joint limit: {summary['limits_violated']}."
         )
     elif summary["close_calls"]:
-        told.append("No command was not finite, none violated a joint limit.")
+        yield "No command was not finite, none violated a joint limit."
     if summary["self_under_limit"]:
-        told.append(
+        yield (
             f"Trials in which the arm came within {SELF_LIMIT_M} m of itself: "
             f"{summary['self_under_limit']}; no law here avoids the own arm."
         )
     if summary["subjects"] < _FEW:
-        told.append(
+        yield (
             f"With fewer than {_FEW} subjects there is no verdict: their intervals say little "
             "about others, however narrow."
         )
     redrawn = ", ".join(f"{reason} {n}" for reason, n in summary["redrawn"].items())
-    told.append(
+    yield (
         f"{counted(summary['subjects'], 'subject')}. "
         + (f"Moved cells drawn again: {redrawn or 'none'}. " if summary["jittered"] else "")
         + f"One core simulated {summary['simulated_s'] / max(summary['wall_s'], 1e-9):.1f} times "
         "faster than real time."
     )
-    return told
 
 
 def _apart(summary: Summary, layout: str, numbers: Summary) -> Iterator[str]:
@@ -255,7 +74,7 @@ def _apart(summary: Summary, layout: str, numbers: Summary) -> Iterator[str]:
                 side = f"{counted(pair['pairs'], 'pair')}, too few to tell wb and sm apart"
             elif pair["low"] > 0.0 or pair["high"] < 0.0:
                 side = f"wb is {'farther off' if pair['low'] > 0.0 else 'nearer'} than sm"
-            yield f"{layout}: {_ROWS.get(row, row)}, {what} true distance: {side} ({text})."
+            yield f"{layout}: {ROW_NAMES.get(row, row)}, {what} true distance: {side} ({text})."
 
 
 def introduction(summary: Summary) -> str:
@@ -270,24 +89,22 @@ def introduction(summary: Summary) -> str:
         if recorded
         else ("Virtual subjects walk in, fetch tools and assemble at a car door")
     )
-    told = [
+    sentences = [
         f"{who} while the arm goes back and forth. Every controller meets the same subjects with "
         f"the same noise of the sensors, {cells}."
     ]
-    if any(key not in compared(summary) for key in _rows(summary)):
-        told.append(
+    if any(
+        key not in compared(summary) for table in ("table1", "table2") for key in summary[table]
+    ):
+        sentences.append(
             "The paper's figures stand beside those rows alone whose cell is the paper's, "
             "hri_task1 or hri_task2 as they are built in."
             if compared(summary)
             else "No row is compared with the paper: none of these cells is hri_task1 or hri_task2 "
             "as they are built in."
         )
-    told += [f"{text}." for name, text in _MOVES.items() if name in names]
-    return " ".join([*told, "Engineering figures from a simulation, not a certificate."])
-
-
-def _rows(summary: Summary) -> list[str]:
-    return [*summary["table1"], *summary["table2"]]
+    sentences += [f"{text}." for name, text in _MOVES.items() if name in names]
+    return " ".join([*sentences, "Engineering figures from a simulation, not a certificate."])
 
 
 _MOVES = {
@@ -306,7 +123,7 @@ def _moving(summary: Summary) -> str:
     names = " and ".join(trial["controller"] for trial in trials)
     recorded = summary.get("recordings")
     whose = ", ".join(recorded) if recorded else f"subject {trials[0]['subject']}"
-    return f"{_ROWS.get(trials[0]['task'], trials[0]['task'])}, {whose}, {names}"
+    return f"{ROW_NAMES.get(trials[0]['task'], trials[0]['task'])}, {whose}, {names}"
 
 
 def captions(summary: Summary) -> dict[str, str]:

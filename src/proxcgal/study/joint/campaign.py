@@ -8,16 +8,16 @@ from proxcgal.core.errors import ConfigError
 from proxcgal.evaluation.metrics import SELF_LIMIT_M, Summary
 from proxcgal.models.macro_micro import part
 from proxcgal.scenario.joint import JointScenario
-from proxcgal.scenario.loading import CONTROLLERS, load_scenario
-from proxcgal.scenario.setup import Setup
-from proxcgal.study.campaign import Campaign, Trial, plain
-from proxcgal.study.jobs import Report
-from proxcgal.study.joint.figures import captions, figures
-from proxcgal.study.joint.metrics import COLUMNS, numbers_of
-from proxcgal.study.joint.texts import listings, verdicts
-from proxcgal.study.kind import CampaignRequest, Kind
-from proxcgal.study.store import Row
-from proxcgal.study.trials import identity, robot_of, simulate
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.study.campaign import Campaign, Trial
+from proxcgal.study.campaign_kind import CampaignKind, CampaignRequest
+from proxcgal.study.campaign_plan import CampaignPlan
+from proxcgal.study.campaign_store import Row
+from proxcgal.study.jobs import ShareReport
+from proxcgal.study.joint.figures import figures
+from proxcgal.study.joint.metrics import COLUMNS, joint_metrics
+from proxcgal.study.joint.texts import captions, listings, verdicts
+from proxcgal.study.trial_simulation import robot_of, simulate_trial
 
 SCENES = (
     "joint_free", "joint_cylinder", "joint_cylinder_tight", "joint_gate", "joint_behind",
@@ -55,57 +55,36 @@ def plan(request: CampaignRequest) -> Campaign:
     Raises:
         ProxError: a scene that does not load or is of another kind.
     """
-    trials: list[Trial] = []
-    scenes: dict[str, str] = {}
-    sources = request.scenarios or SCENES
-    for source in sources:
+    campaign = CampaignPlan("joint", request, SCENES)
+    for source in campaign.scenarios:
         base = load_scenario(source, request.overrides)
         if not isinstance(base, JointScenario):
             raise ConfigError(f"--scenario {source}: kind = {base.kind!r}; needs 'joint'")
-        if plain(base.name) in {plain(trial.scenario.name) for trial in trials}:
-            raise ConfigError(f"--scenario {source}: there is another one named {plain(base.name)}")
-        robot = robot_of(base)
-        Setup.of(base, robot)
-        part(robot, base.controller.macro_joints, "macro")  # every run tells both arms
-        scenes |= identity(base, robot)
-
-        def trial(
-            init: str, stack: str, perception: str, controller: str, seed: int,
-            changes: tuple[str, ...], source: str = source, digest: str = robot.digest,
-        ) -> Trial:  # fmt: skip
-            overrides = (*request.overrides, f'initial=["{init}"]', *changes)
-            scenario = load_scenario(source, overrides)
-            return Trial(
-                scenario=scenario, source=source, overrides=overrides, controller=controller,
-                seed=seed, robot_digest=digest,
-                tags={"scene": scenario.name, "init": init, "stack": stack,
-                      "perception": perception, "run": seed - request.seed},
-            )  # fmt: skip
-
+        robot = campaign.add_scene(source, base).robot
+        part(robot, base.controller.macro_joints, "macro")  # the numbers are of both arms
         for init in base.initial:
-            trials += [
-                trial(init, stack, "known", "wb_known", request.seed, changes)
-                for stack, changes in STACKS.items()
-            ]
-            trials += [
-                trial(init, "full", perception, controller, request.seed + number, changes)
+            runs = [("wb_known", stack, "known", 0, changes) for stack, changes in STACKS.items()]
+            runs += [
+                (controller, "full", perception, number, changes)
                 for perception, (controller, changes) in PERCEPTIONS.items()
-                if controller in CONTROLLERS
                 for number in range(request.runs)
             ]
-    description = {
-        "kind": "joint", "seed": request.seed, "scenarios": list(sources),
-        "set": list(request.overrides), **scenes,
-    }  # fmt: skip
-    return Campaign(description=description, trials=trials, perform=perform, columns=COLUMNS)
+            for controller, stack, perception, number, changes in runs:
+                overrides = (*request.overrides, f'initial=["{init}"]', *changes)
+                scenario = load_scenario(source, overrides)
+                campaign.add_trial(
+                    scenario, source, overrides, controller, number, robot, scene=scenario.name,
+                    init=init, stack=stack, perception=perception, run=number,
+                )  # fmt: skip
+    return campaign.campaign(perform, COLUMNS)
 
 
-def perform(trial: Trial, report: Report) -> Row:
+def perform(trial: Trial, report: ShareReport) -> Row:
     """One run's numbers."""
-    log = simulate(
+    log = simulate_trial(
         trial.scenario, trial.controller, trial.seed, report, robot_digest=trial.robot_digest
     )
-    return numbers_of(log, trial.scenario, robot_of(trial.scenario, trial.robot_digest))
+    return joint_metrics(log, trial.scenario, robot_of(trial.scenario, trial.robot_digest))
 
 
 def analyse(table: pl.DataFrame, campaign: Campaign) -> Summary:
@@ -132,7 +111,7 @@ def worst(table: pl.DataFrame) -> list[str]:
     return ours.sort("true_min_m", "key")["key"].to_list()
 
 
-KIND = Kind(
+KIND = CampaignKind(
     title="The 12-joint robot: what each task costs and buys",
     introduction="A UR10e on the flange of a KUKA KR 150-2, one chain of 12 joints, goals by task "
     "priority. Every scene from every initial configuration, with the full stack, the thesis's, "

@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
+import polars as pl
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from proxcgal.evaluation.metrics import Summary
 from proxcgal.evaluation.trial_log import TOO_CLOSE
-from proxcgal.study.campaign import plain
-from proxcgal.study.figures import DPI, GREY, LEGEND
-
-if TYPE_CHECKING:
-    import polars as pl
-    from matplotlib.axes import Axes
-
-    from proxcgal.evaluation.metrics import Summary
+from proxcgal.study.campaign import file_name
+from proxcgal.study.plotting import DOTTED, GREY, LEGEND, new_figure, tidy_axes
 
 Series = Mapping[str, Any]
 
@@ -38,7 +34,6 @@ _SEEN = {
     "memory": ("#CC79A7", "sensed with memory"),
 }
 NEAR_M = 0.6  # [m] distances beyond it are not shown
-_DOTTED: Any = (0, (1, 1.5))
 
 
 def figures(table: pl.DataFrame, _: Summary | None = None) -> dict[str, Figure]:
@@ -48,11 +43,11 @@ def figures(table: pl.DataFrame, _: Summary | None = None) -> dict[str, Figure]:
         runs = [row for row in own.iter_rows(named=True)
                 if row["stack"] == "full" and row["series"] is not None]  # fmt: skip
         if runs:
-            found[f"{plain(str(scene))}.png"] = scene_figure(str(scene), runs)
+            found[f"{file_name(str(scene))}.png"] = joint_figure(str(scene), runs)
     return found
 
 
-def scene_figure(scene: str, runs: Sequence[Mapping[str, Any]]) -> Figure:
+def joint_figure(scene: str, runs: Sequence[Mapping[str, Any]]) -> Figure:
     """Speeds and activations of the known run, true distances of all; a column for each start.
 
     Args:
@@ -60,9 +55,7 @@ def scene_figure(scene: str, runs: Sequence[Mapping[str, Any]]) -> Figure:
         runs: rows of the campaign's table with their `series`, all of the full stack.
     """
     starts = list(dict.fromkeys(str(run["init"]) for run in runs))
-    figure = Figure(figsize=(max(4.9 * len(starts), 6.4), 6.6), dpi=DPI, layout="constrained")
-    FigureCanvasAgg(figure)
-    figure.suptitle(f"{scene}, full stack", fontsize=12, fontweight="bold")
+    figure = new_figure(max(4.9 * len(starts), 6.4), 6.6, f"{scene}, full stack")
     axes = figure.subplots(
         3, len(starts), sharex="col", sharey="row", squeeze=False, height_ratios=(1.3, 1.0, 1.3)
     )
@@ -79,9 +72,8 @@ def scene_figure(scene: str, runs: Sequence[Mapping[str, Any]]) -> Figure:
         axes[2, column].set_xlabel("time [s]", fontsize=10)
     for row, name in enumerate(("speed at the tool [m/s]", "activation [-]", "true distance [m]")):
         axes[row, 0].set_ylabel(name, fontsize=10)
+    tidy_axes(*axes.ravel())
     for ax in axes.ravel():
-        ax.tick_params(labelsize=9)
-        ax.spines[["top", "right"]].set_visible(False)
         ax.set_xlim(left=0.0)
     for row in range(3):
         lines = {
@@ -113,8 +105,7 @@ def _activations(ax: Axes, series: Series) -> None:
                 series["time"], _gaps(values), color=_TASKS[name], linewidth=1.5,
                 label=name.replace("_", " "),
             )  # fmt: skip
-    ax.set_ylim(-0.05, 1.08)
-    ax.set_yticks((0.0, 0.5, 1.0))
+    ax.set(ylim=(-0.05, 1.08), yticks=(0.0, 0.5, 1.0))
 
 
 def _distances(ax: Axes, own: Mapping[str, Series]) -> None:
@@ -126,7 +117,7 @@ def _distances(ax: Axes, own: Mapping[str, Series]) -> None:
                 ax.plot(own[key]["time"], true, color=colour, linewidth=1.5, label=name)
                 ax.plot(own[key]["time"][-1], true[-1], "o", color=colour, markersize=4)
     if ax.lines:
-        ax.axhline(TOO_CLOSE, color=GREY, linewidth=1.0, linestyle=_DOTTED, label="0.05 m")
+        ax.axhline(TOO_CLOSE, color=GREY, linewidth=1.0, linestyle=DOTTED, label="0.05 m")
         ax.set_ylim(0.0, NEAR_M)
     else:
         ax.text(
@@ -136,17 +127,3 @@ def _distances(ax: Axes, own: Mapping[str, Series]) -> None:
 
 def _gaps(values: Sequence[float | None]) -> Any:
     return np.array([np.nan if value is None else value for value in values])
-
-
-def captions(summary: Summary) -> dict[str, str]:
-    """What the figures show."""
-    scenes = dict.fromkeys(run["scenario"] for run in summary["runs"] if run["stack"] == "full")
-    return {f"{plain(scene)}.png": f"{scene}: {_CAPTION}" for scene in scenes}
-
-
-_CAPTION = (
-    "the full stack from each initial configuration. Top: how fast each arm alone would move the "
-    "tool, |J qd| of its own joints, obstacles known. Middle: the most active row of each task in "
-    "the same run. Bottom: true distance from the robot to the scene, known, sensed, and sensed "
-    "with memory (the first seed); a dot ends each run."
-)

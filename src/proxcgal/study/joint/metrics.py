@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -11,13 +11,10 @@ from proxcgal.core.modes import HOLD
 from proxcgal.core.typing import Array
 from proxcgal.evaluation.ground_truth import GroundTruth
 from proxcgal.evaluation.metrics import NOTHING_M
-from proxcgal.models import macro_micro
-
-if TYPE_CHECKING:
-    from proxcgal.models import Robot
-    from proxcgal.scenario.loading import Scenario
-    from proxcgal.study.store import Row
-    from proxcgal.trial.trial import TrialLog
+from proxcgal.models import Robot, macro_micro
+from proxcgal.scenario.loading import Scenario
+from proxcgal.study.campaign_store import Row
+from proxcgal.trial.trial import TrialLog
 
 SERIES_S = 0.1  # [s] between the points of a curve
 COLUMNS = (
@@ -29,7 +26,7 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def numbers_of(log: TrialLog, scenario: Scenario, robot: Robot) -> Row:
+def joint_metrics(log: TrialLog, scenario: Scenario, robot: Robot) -> Row:
     """The numbers of one run, by the names of COLUMNS.
 
     `macro_share` is the integral of |J_macro qd_macro| over that plus |J_micro qd_micro|, linear

@@ -1,4 +1,4 @@
-"""What the runs of the 12-joint robot amount to, for people: tables, and sentences from numbers."""
+"""Texts of the runs of the 12-joint robot: tables, verdicts, captions."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import Any
 
 from proxcgal.evaluation.metrics import NOTHING_M, SELF_LIMIT_M, Summary, shown
 from proxcgal.evaluation.trial_log import TOO_CLOSE
-from proxcgal.study.kind import Listing
+from proxcgal.study.campaign import file_name
+from proxcgal.study.listing import Listing
 
 Run = dict[str, Any]
 
@@ -33,7 +34,7 @@ def listings(summary: Summary) -> list[Listing]:
     """A row for each known run, then one for each way of sensing, start and scene."""
     runs = summary["runs"]
     known = [run for run in runs if run["perception"] == "known"]
-    compared = _stack_words(_full(runs))
+    compared = _stack_text(_full(runs))
     return [
         Listing(
             caption="Known obstacles, each stack. End: reached (0.03 m, 0.05 rad, unless the file "
@@ -83,20 +84,18 @@ def _sensed_rows(runs: Sequence[Run]) -> Iterator[tuple[str, ...]]:
         )  # fmt: skip
 
 
-def verdicts(summary: Summary) -> list[str]:
+def verdicts(summary: Summary) -> Iterator[str]:
     """What each task costs and buys, what sensing costs, what held the arm; from the numbers."""
     runs = summary["runs"]
-    told = [
-        *_endings(runs), *_macro(runs), *_tasks(runs), *_sensing(runs), *_second_set(runs)
-    ]  # fmt: skip
+    for about in (_endings, _macro, _tasks, _sensing, _second_set):
+        yield from about(runs)
     if summary["self_under_limit"]:
         close = sorted({_where(run) for run in runs if run["self_min_m"] < SELF_LIMIT_M})
-        told.append(
+        yield (
             f"Runs in which the robot came within {SELF_LIMIT_M} m of itself: "
             f"{summary['self_under_limit']}; by the rule of single runs these have failed: "
             f"{', '.join(close)}."
         )
-    return told
 
 
 def _endings(runs: Sequence[Run]) -> Iterator[str]:
@@ -105,7 +104,7 @@ def _endings(runs: Sequence[Run]) -> Iterator[str]:
         return
     reached = [run for run in known if run["succeeded"]]
     yield (
-        f"Known obstacles, {_stack_words(known)}: "
+        f"Known obstacles, {_stack_text(known)}: "
         f"{len(reached)} of {len(known)} runs reach the goal"
         + (f", in {_span(run['time_s'] for run in reached)} s" if reached else "")
         + "."
@@ -141,7 +140,7 @@ def _tasks(runs: Sequence[Run]) -> Iterator[str]:
             f"runs reach the goal (full: {_reached([b for _, b in pairs])})"
         )
         if both:
-            # + 0.0: nothing is told as "+0.0 s", never "-0.0 s"
+            # + 0.0: "+0.0 s", never "-0.0 s"
             slower = round(median(a["time_s"] - b["time_s"] for a, b in both), 1) + 0.0
             text += f", {slower:+.1f} s in the median of those where both do"
         changes = [
@@ -151,12 +150,12 @@ def _tasks(runs: Sequence[Run]) -> Iterator[str]:
             ("least between own links", "self_min_m", "m", 3),
             ("least manipulability of the UR10e", "manipulability_micro", "of its largest", 3),
         ]
-        told = []
+        apart = []
         for name, key, unit, digits in changes:
             ours, other = min(a[key] for a, _ in pairs), min(b[key] for _, b in pairs)
             if min(ours, other) < NOTHING_M and abs(ours - other) >= 0.5 * 10.0**-digits:
-                told.append(f"{name} {ours:.{digits}f} {unit} (full: {other:.{digits}f})")
-        yield text + ("; " + ", ".join(told) if told else "; nothing else changes") + "."
+                apart.append(f"{name} {ours:.{digits}f} {unit} (full: {other:.{digits}f})")
+        yield text + ("; " + ", ".join(apart) if apart else "; nothing else changes") + "."
 
 
 def _sensing(runs: Sequence[Run]) -> Iterator[str]:
@@ -209,7 +208,7 @@ def _full(runs: Sequence[Run]) -> list[Run]:
     return [run for run in runs if run["stack"] == compared]
 
 
-def _stack_words(runs: Sequence[Run]) -> str:
+def _stack_text(runs: Sequence[Run]) -> str:
     """What stack these runs of one had."""
     stack = runs[0]["stack"] if runs else "full"
     return f"the {stack} stack" if stack in ("full", "thesis") else f"the stack of {stack}"
@@ -242,3 +241,17 @@ def _grouped(runs: Sequence[Run], *keys: str) -> Iterator[tuple[tuple[str, ...],
 
 def _sentence(text: str) -> str:
     return text[:1].upper() + text[1:]
+
+
+def captions(summary: Summary) -> dict[str, str]:
+    """What the figures show."""
+    scenes = dict.fromkeys(run["scenario"] for run in summary["runs"] if run["stack"] == "full")
+    return {f"{file_name(scene)}.png": f"{scene}: {_CAPTION}" for scene in scenes}
+
+
+_CAPTION = (
+    "the full stack from each initial configuration. Top: how fast each arm alone would move the "
+    "tool, |J qd| of its own joints, obstacles known. Middle: the most active row of each task in "
+    "the same run. Bottom: true distance from the robot to the scene, known, sensed, and sensed "
+    "with memory (the first seed); a dot ends each run."
+)

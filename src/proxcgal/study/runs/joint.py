@@ -1,21 +1,29 @@
-"""`proxcgal run` of a scene for the 12-joint robot: from each initial configuration of its file."""
+"""Runs of a scene for the 12-joint robot: from each initial configuration of its file."""
 
 from __future__ import annotations
 
 import functools
 import sys
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from proxcgal.core.errors import ConfigError
-from proxcgal.core.progress import Progress
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from proxcgal.evaluation.metrics import Summary
-    from proxcgal.scenario.joint import JointScenario
-    from proxcgal.trial.trial import TrialLog
+from proxcgal.core.provenance import origin
+from proxcgal.evaluation.metrics import SELF_LIMIT_M, Summary, write_bytes, write_json, write_text
+from proxcgal.models.macro_micro import part
+from proxcgal.scenario.controller import STACKS
+from proxcgal.scenario.joint import JointScenario
+from proxcgal.study.joint.figures import joint_figure
+from proxcgal.study.joint.metrics import joint_metrics
+from proxcgal.study.joint.texts import listings, verdicts
+from proxcgal.study.plotting import png
+from proxcgal.study.runs.result_folders import ready_folders
+from proxcgal.study.runs.setup_check import check_setup
+from proxcgal.study.runs.simulation import simulate_all
+from proxcgal.study.trial_simulation import robot_of, simulate_trial
+from proxcgal.study.workers import Pool, default_workers
+from proxcgal.trial.trial import TrialLog
 
 FIGURE = "joint.png"
 _PERCEPTIONS = {"wb_known": "known", "wb_memory": "memory", "sm": "sensed, sensor points"}
@@ -29,38 +37,36 @@ def run_joint(
     *,
     workers: int | None,
     quiet: bool,
-) -> int:
-    """Runs each controller from each start; prints the table and the report's path.
+) -> bool:
+    """Runs each controller from each start, fills the folder, and prints tables and verdicts.
+
+    Args:
+        scenario: with its initial configurations.
+        controllers: from CONTROLLERS.
+        folder: of the results.
+        command: as typed; for `run.json`.
+        workers: processes; None takes one a processor.
+        quiet: no progress on stderr.
 
     Returns:
-        1 where the robot came too near to itself, else 0: a goal not reached is a result.
+        True where the robot came too near to itself; a goal not reached is a result.
 
     Raises:
         ProxError: what does not fit, a run that cannot go on.
     """
-    from proxcgal.core.provenance import origin
-    from proxcgal.evaluation.metrics import SELF_LIMIT_M, write_bytes, write_json, write_text
-    from proxcgal.models.macro_micro import part
-    from proxcgal.report.report import write_report
-    from proxcgal.study.figures import png
-    from proxcgal.study.joint.figures import scene_figure
-    from proxcgal.study.joint.texts import listings, verdicts
-    from proxcgal.study.runs.results import check, ready
-    from proxcgal.study.trials import robot_of
-
     if scenario.q0:
         raise ConfigError(
             f"scenario {scenario.name}: q0: runs begin from `initial`; add a configuration instead"
         )
     starts = scenario.starts()
     for start in starts:
-        check(start, controllers, quiet=quiet)
-        part(robot_of(start), start.controller.macro_joints, "macro")  # its table tells both arms
-    ready([folder])
+        check_setup(start, controllers, quiet=quiet)
+        part(robot_of(start), start.controller.macro_joints, "macro")  # its table has both arms
+    ready_folders([folder])
     jobs = [(start, name) for start in starts for name in controllers]
     for start, name in jobs:
         _recording(folder, start, name).unlink(missing_ok=True)
-    rows = _rows(jobs, folder, workers, quiet)
+    rows = _runs(jobs, folder, workers, quiet)
     # What a campaign's table has beside these are strings for its figures.
     runs = [{key: value for key, value in row.items() if key != "series"} for row in rows]
     own = [row["self_min_m"] for row in rows]
@@ -70,12 +76,10 @@ def run_joint(
         "failed": min(own) < SELF_LIMIT_M,
     }  # fmt: skip
     write_text(folder / "scenario.toml", scenario.to_toml())
-    made = origin(command)
-    write_json(folder / "run.json", {**made, "description": scenario.description})
+    write_json(folder / "run.json", {**origin(command), "description": scenario.description})
     shown = [{**row, "stack": "full"} for row in rows]  # whatever the stack is
-    write_bytes(folder / FIGURE, png(scene_figure(scenario.name, shown)))
+    write_bytes(folder / FIGURE, png(joint_figure(scenario.name, shown)))
     write_json(folder / "summary.json", summary)
-    report = write_report(folder)
     for listing in listings(summary):
         if listing.rows:
             print(f"{listing}\n")
@@ -86,56 +90,41 @@ def run_joint(
             f"proxcgal: {scenario.name}: failed: the robot came within {min(own):.3f} m of itself, "
             f"allowed is {SELF_LIMIT_M} m", file=sys.stderr,
         )  # fmt: skip
-    print(report)
-    return 1 if summary["failed"] else 0
+    return bool(summary["failed"])
 
 
 def _recording(folder: Path, start: JointScenario, controller: str) -> Path:
     return folder / f"{start.initial[0]}-{controller}.mcap"
 
 
-def _rows(
+def _runs(
     jobs: Sequence[tuple[JointScenario, str]], folder: Path, workers: int | None, quiet: bool
 ) -> list[dict[str, Any]]:
-    from proxcgal.study.joint.metrics import numbers_of
-    from proxcgal.study.runs.results import warn_of_stopped
-    from proxcgal.study.trials import robot_of, simulate
-    from proxcgal.study.workers import Pool, default_workers
-
+    """Simulates; one entry per run, as the campaign's table has it."""
     calls = [
         functools.partial(
-            simulate, start, name, start.seed, recording=_recording(folder, start, name)
+            simulate_trial, start, name, start.seed, recording=_recording(folder, start, name)
         )
         for start, name in jobs
     ]
-    with (
-        Pool(workers or default_workers(len(jobs))) as pool,
-        Progress("simulating", [s.duration for s, _ in jobs], "s", quiet=quiet) as progress,
-    ):
 
-        def done(row: int, log: TrialLog) -> None:
-            start, name = jobs[row]
-            reason = log.ending.reason if log.ending else ""
-            progress.finished(f"{start.name} {start.initial[0]} {name}: {reason}")
+    def line(row: int, log: TrialLog) -> str:
+        start, name = jobs[row]
+        reason = log.ending.reason if log.ending else ""
+        return f"{start.name} {start.initial[0]} {name}: {reason}"
 
-        logs: list[TrialLog] = pool.run(calls, progress.shares, done)
-    warn_of_stopped(logs)
-    rows = []
+    seconds = [start.duration for start, _ in jobs]
+    with Pool(workers or default_workers(len(jobs))) as pool:
+        logs = simulate_all(pool, calls, seconds, line, quiet=quiet)
+    stacks: dict[tuple[str, ...], str] = {tasks: name for name, tasks in STACKS.items()}
+    runs = []
     for (start, name), log in zip(jobs, logs, strict=True):
-        levels = start.controller.levels
+        levels = tuple(start.controller.levels)
         sensed = "known" if start.perception == "known" else "sensed"
-        rows.append(
+        runs.append(
             {"scenario": start.name, "robot": log.robot, "init": start.initial[0],
-             "tasks": list(levels), "stack": _named(levels),
+             "tasks": list(levels), "stack": stacks.get(levels, ", ".join(levels)),
              "perception": _PERCEPTIONS.get(name, sensed), "controller": name, "seed": start.seed,
-             **numbers_of(log, start, robot_of(start))}
+             **joint_metrics(log, start, robot_of(start))}
         )  # fmt: skip
-    return rows
-
-
-def _named(levels: Sequence[str]) -> str:
-    """The stack's name where it has one, else its tasks."""
-    from proxcgal.scenario.controller import STACKS
-
-    known: dict[tuple[str, ...], str] = {tasks: name for name, tasks in STACKS.items()}
-    return known.get(tuple(levels), ", ".join(levels))
+    return runs

@@ -2,32 +2,31 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from proxcgal.core.errors import SimulationError
 from proxcgal.evaluation.metrics import write_bytes
-from proxcgal.scenario.loading import HriScenario
-
-if TYPE_CHECKING:
-    from proxcgal.scenario.loading import Scenario
-    from proxcgal.study.figures import Signals
-    from proxcgal.study.jobs import Report
-    from proxcgal.trial.trial import TrialLog
+from proxcgal.recording.reader import read_recording
+from proxcgal.scenario.loading import HriScenario, Scenario
+from proxcgal.scenario.setup import Setup
+from proxcgal.study.jobs import ShareReport
+from proxcgal.study.motion_picture import MOVING, STILL, bearing_for, motion_picture
+from proxcgal.study.pair_figure import pair_figure, sensor_view, whole_body_view
+from proxcgal.study.plotting import Signals, png
+from proxcgal.study.time_figure import time_figure
+from proxcgal.trial.trial import TrialLog
 
 DRAWN_SPACING_M = 0.03  # [m] between the obstacle's points in a figure
-MOVING = ("wb", "sm")  # whose recordings the moving picture shows, side by side
+SIDE_BY_SIDE = ("wb", "sm")  # controllers in the moving picture
 
 
-def draw_figures(scenario: Scenario, logs: Sequence[TrialLog], folder: Path, report: Report) -> str:
+def draw_figures(
+    scenario: Scenario, logs: Sequence[TrialLog], folder: Path, report: ShareReport
+) -> str:
     """Draws `distance.png` and, where a posture shows a pair, `pairs.png`; what was drawn."""
-    from proxcgal.scenario.setup import Setup
-    from proxcgal.study.figures import png, time_figure
-
     settings = scenario.controller
     title = f"{scenario.name}: {logs[0].robot}, seed {logs[0].seed}"
     signals: Signals = ()
@@ -46,11 +45,6 @@ def draw_figures(scenario: Scenario, logs: Sequence[TrialLog], folder: Path, rep
 
 def _draw_pairs(scenario: Scenario, logs: Sequence[TrialLog], folder: Path) -> str:
     """On the posture of the whole-body run at which it was nearest to what it saw."""
-    from proxcgal.scenario.setup import Setup
-    from proxcgal.study.figures import png
-    from proxcgal.study.motion_picture import bearing_for
-    from proxcgal.study.pair_figure import pair_figure, sensor_view, whole_body_view
-
     setup = Setup.of(scenario)
     if not setup.scene.solids:
         return ""
@@ -79,24 +73,17 @@ def _draw_pairs(scenario: Scenario, logs: Sequence[TrialLog], folder: Path) -> s
     return ", pairs.png"
 
 
-def draw_motion(scenario: Scenario, folder: Path, report: Report) -> str:
+def draw_motion(scenario: Scenario, folder: Path, report: ShareReport) -> str:
     """Draws `motion.gif` and `motion.png` from the folder's recordings; what was drawn, or why not.
 
     A machine that cannot draw off screen still gets all its numbers and figures.
     """
-    from proxcgal.recording.reader import read_recording
-    from proxcgal.study.motion_picture import motion_picture
-
-    files = [folder / f"{name}.mcap" for name in MOVING]
+    files = [folder / f"{name}.mcap" for name in SIDE_BY_SIDE]
     recordings = [read_recording(path) for path in files if path.is_file()]
     if not recordings:
-        return f"{scenario.name}: no motion.gif: neither {' nor '.join(MOVING)} was run"
-    names = ("motion.gif", "motion.png")
+        return f"{scenario.name}: no {MOVING}: neither {' nor '.join(SIDE_BY_SIDE)} was run"
     try:
-        with tempfile.TemporaryDirectory(prefix=".drawing-", dir=folder) as half:
-            motion_picture(recordings, Path(half) / names[0], Path(half) / names[1], report)
-            for name in names:
-                (Path(half) / name).replace(folder / name)
+        motion_picture(recordings, folder, report)
     except SimulationError as error:
-        return f"{scenario.name}: no motion.gif: {error}"
-    return f"{scenario.name}: {', '.join(names)}"
+        return f"{scenario.name}: no {MOVING}: {error}"
+    return f"{scenario.name}: {MOVING}, {STILL}"

@@ -1,48 +1,49 @@
-"""What `proxcgal run` does with a walk-through: teach, record, play back, draw, tell."""
+"""Run of a walk-through: teach, record, play back, draw, and say what was found."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from proxcgal.core.progress import Progress, announce
-from proxcgal.evaluation.metrics import aligned, write_bytes
-
-if TYPE_CHECKING:
-    from proxcgal.scenario.walkthrough import WalkScenario
-    from proxcgal.trial.walkthrough.run import WalkResult
-    from proxcgal.trial.walkthrough.setup import WalkSetup
+from proxcgal.core.provenance import origin
+from proxcgal.evaluation.metrics import aligned, write_bytes, write_json, write_text
+from proxcgal.scenario.walkthrough import WalkScenario
+from proxcgal.study.plotting import png
+from proxcgal.study.runs.result_folders import ready_folders, remove_empty
+from proxcgal.study.walkthrough.figures import ratings_figure, teach_figure, trip_figure
+from proxcgal.study.walkthrough.ratings import read_ratings
+from proxcgal.trial.walkthrough.run import WalkResult, run_walk
+from proxcgal.trial.walkthrough.setup import WalkSetup
+from proxcgal.trial.walkthrough.taught import to_csv, to_trajectory
+from proxcgal.trial.walkthrough.teach import REACHED, check_duration
 
 RECORDING, FIGURE, TABLE, TRAJECTORY = "taught.mcap", "walkthrough.png", "path.csv", "path.json"
 RATINGS = "ratings.png"
 
 
-def run_walkthrough(
-    scenario: WalkScenario, folder: Path, origin: dict[str, Any], *, quiet: bool
-) -> int:
-    """Runs it and fills the folder; prints what it found and the report's path.
+def run_walkthrough(scenario: WalkScenario, folder: Path, command: str, *, quiet: bool) -> None:
+    """Runs it and fills the folder; prints the guard's bounds and the results.
+
+    Args:
+        scenario: what to run.
+        folder: of the results.
+        command: as typed; for `run.json`.
+        quiet: no progress on stderr.
 
     Raises:
         ConfigError: what does not fit, a guard that contradicts itself, a folder that cannot be
             written.
         SimulationError: MuJoCo warned.
     """
-    from proxcgal.report.report import write_report
-    from proxcgal.study.figures import png
-    from proxcgal.study.runs.results import ready, remove_empty
-    from proxcgal.study.walkthrough.figures import ratings_figure
-    from proxcgal.study.walkthrough.ratings import read_ratings
-    from proxcgal.trial.walkthrough.run import run_walk
-    from proxcgal.trial.walkthrough.setup import WalkSetup
-    from proxcgal.trial.walkthrough.teach import check_duration
-
+    about = origin(command)
     ratings = read_ratings(Path(scenario.ratings)) if scenario.ratings else {}
     announce(f"setting up {scenario.name}", quiet=quiet)
     setup = WalkSetup.of(scenario)
     check_duration(scenario)  # before the files of an older run are removed
-    told = setup.told()
-    print("\n".join(told))
-    made = ready([folder])
+    guard = setup.told()
+    print("\n".join(guard))
+    made = ready_folders([folder])
     for name in (RECORDING, FIGURE, TABLE, TRAJECTORY, RATINGS):
         (folder / name).unlink(missing_ok=True)
     try:
@@ -53,22 +54,15 @@ def run_walkthrough(
             )  # fmt: skip
         if ratings:
             write_bytes(folder / RATINGS, png(ratings_figure(ratings)))
-        summary = _write(setup, result, folder, origin | {"guard": told})
+        summary = _write(setup, result, folder, about | {"guard": guard})
     finally:
         remove_empty(made)
-    print("\n".join(lines_of(summary)))
-    print(write_report(folder))
-    return 0
+    print("\n".join(walkthrough_lines(summary)))
 
 
 def _write(
-    setup: WalkSetup, result: WalkResult, folder: Path, origin: dict[str, Any]
+    setup: WalkSetup, result: WalkResult, folder: Path, about: dict[str, Any]
 ) -> dict[str, Any]:
-    from proxcgal.evaluation.metrics import write_json, write_text
-    from proxcgal.study.figures import png
-    from proxcgal.study.walkthrough.figures import teach_figure, trip_figure
-    from proxcgal.trial.walkthrough.taught import to_csv, to_trajectory
-
     scenario = setup.scenario
     title = f"{scenario.name}: {setup.robot.name}, seed {scenario.seed}"
     if result.log.trips:
@@ -88,12 +82,12 @@ def _write(
         "self_min_m": None,
     }  # fmt: skip
     write_text(folder / "scenario.toml", scenario.to_toml())
-    write_json(folder / "run.json", {**origin, "description": scenario.description})
+    write_json(folder / "run.json", {**about, "description": scenario.description})
     write_json(folder / "summary.json", summary)
     return summary
 
 
-def lines_of(summary: dict[str, Any]) -> list[str]:
+def walkthrough_lines(summary: dict[str, Any]) -> list[str]:
     """What a run found, for a terminal and for a page."""
     found = []
     for trip in summary["trips"]:
@@ -154,8 +148,6 @@ def _cut(trip: dict[str, Any]) -> str:
 
 def _unfinished(how: str, taught: dict[str, Any]) -> list[str]:
     """Says where a teaching without a trip did not come to its path's end."""
-    from proxcgal.trial.walkthrough.teach import REACHED
-
     left = taught.get("left_m")
     if left is None or left <= REACHED:
         return []

@@ -1,4 +1,4 @@
-"""The static scenes drawn anew: what whole-body avoidance gains, and what sensing costs it."""
+"""Static scenes with random draws: what whole-body avoidance gains, and what sensing costs it."""
 
 from __future__ import annotations
 
@@ -19,17 +19,18 @@ from proxcgal.evaluation.metrics import (
     finite,
 )
 from proxcgal.scenario.loading import CONTROLLERS, Scenario, load_scenario
-from proxcgal.scenario.setup import Setup
 from proxcgal.study.bootstrap import median_interval
-from proxcgal.study.campaign import Campaign, Trial, plain
-from proxcgal.study.jobs import Report
-from proxcgal.study.kind import CampaignRequest, Kind
-from proxcgal.study.paired import ends_of, pairs
+from proxcgal.study.campaign import Campaign, Trial
+from proxcgal.study.campaign_kind import CampaignKind, CampaignRequest
+from proxcgal.study.campaign_plan import CampaignPlan
+from proxcgal.study.campaign_store import Row
+from proxcgal.study.jobs import ShareReport
+from proxcgal.study.paired import draw_distances, pairs
 from proxcgal.study.static.draws import draw_scene
+from proxcgal.study.static.figures import figures
 from proxcgal.study.static.memory_share import memory_summary
-from proxcgal.study.static.texts import captions, figures, listings, verdicts
-from proxcgal.study.store import Row
-from proxcgal.study.trials import identity, robot_of, simulate
+from proxcgal.study.static.texts import captions, listings, verdicts
+from proxcgal.study.trial_simulation import simulate_trial
 
 SCENES = ("front_plane", "side_plane")
 #: Of the trials under 0.05 m: the cloud's nearest point was this much farther away than the panel
@@ -57,46 +58,30 @@ def plan(request: CampaignRequest) -> Campaign:
     Raises:
         ProxError: a scene that nothing can be drawn round, or that does not load.
     """
-    trials: list[Trial] = []
+    campaign = CampaignPlan("static", request, SCENES)
     redrawn: dict[str, dict[str, int]] = {}
-    scenes: dict[str, str] = {}
-    sources = request.scenarios or SCENES
     if "seed" in (assignment.partition("=")[0].strip() for assignment in request.overrides):
         raise ConfigError("--set seed=...: every draw has its own; --seed fixes them all")
-    for source in sources:
+    for source in campaign.scenarios:
         base = load_scenario(source, request.overrides)
-        robot = robot_of(base)
-        Setup.of(base, robot)  # tells what does not fit before anything is drawn
-        if plain(base.name) in map(plain, redrawn):
-            raise ConfigError(f"--scenario {source}: there is another one named {plain(base.name)}")
-        scenes |= identity(base, robot)
+        robot = campaign.add_scene(source, base).robot
         reasons: Counter[str] = Counter()
         for number in range(request.runs):
             draw = draw_scene(base, robot, request.seed, number)
             reasons += draw.redrawn
-            trials += [
-                Trial(
-                    scenario=draw.scenario, source=source,
-                    overrides=(*request.overrides, *draw.overrides), controller=controller,
-                    seed=request.seed + number, robot_digest=robot.digest,
-                    tags={"scene": base.name, "draw": number},
-                )
-                for controller in CONTROLLERS
-            ]  # fmt: skip
+            overrides = (*request.overrides, *draw.overrides)
+            for controller in CONTROLLERS:
+                campaign.add_trial(
+                    draw.scenario, source, overrides, controller, number, robot,
+                    scene=base.name, draw=number,
+                )  # fmt: skip
         redrawn[base.name] = dict(sorted(reasons.items()))
-    description = {
-        "kind": "static", "seed": request.seed, "scenarios": list(sources),
-        "set": list(request.overrides), **scenes,
-    }  # fmt: skip
-    return Campaign(
-        description=description, trials=trials, perform=perform, columns=_columns(trials[0]),
-        notes={"redrawn": redrawn},
-    )  # fmt: skip
+    return campaign.campaign(perform, _columns(campaign.trials[0]), redrawn=redrawn)
 
 
-def perform(trial: Trial, report: Report) -> Row:
+def perform(trial: Trial, report: ShareReport) -> Row:
     """One trial's numbers, beside what was drawn for it."""
-    log = simulate(
+    log = simulate_trial(
         trial.scenario, trial.controller, trial.seed, report, robot_digest=trial.robot_digest,
         coverage=trial.controller in LOOKED_AT,
     )  # fmt: skip
@@ -147,7 +132,7 @@ def analyse(table: pl.DataFrame, campaign: Campaign) -> Summary:
     """
     scenes = {}
     for (scene,), own in table.group_by(["scene"], maintain_order=True):
-        ends = ends_of(own)
+        ends = draw_distances(own)
         scenes[str(scene)] = {
             "draws": own["draw"].n_unique(),
             "redrawn": campaign.notes["redrawn"][scene],
@@ -217,7 +202,7 @@ def worst(table: pl.DataFrame) -> list[str]:
     return order["key"].to_list()
 
 
-KIND = Kind(
+KIND = CampaignKind(
     title="Static scenes, drawn at random",
     introduction="Panels, start postures and goals drawn round the paper's static scenes; every "
     "controller meets the same draws, with the same noise of the sensors. wb moves the nearest "

@@ -70,8 +70,8 @@ def draw_scene(base: Scenario, robot: Robot, seed: int, number: int) -> Draw:
         if reason is None:
             return Draw(overrides=overrides, scenario=scenario, redrawn=redrawn)
         redrawn[reason] += 1
-    told = ", ".join(f"{reason} {count} times" for reason, count in redrawn.most_common())
-    raise ConfigError(f"scenario {base.name}: none of {_TRIES} draws round it will do: {told}")
+    counts = ", ".join(f"{reason} {count} times" for reason, count in redrawn.most_common())
+    raise ConfigError(f"scenario {base.name}: none of {_TRIES} draws round it will do: {counts}")
 
 
 def _overrides(

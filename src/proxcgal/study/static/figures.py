@@ -2,45 +2,64 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
 import polars as pl
-from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from proxcgal.evaluation.metrics import Summary
 from proxcgal.evaluation.trial_log import TOO_CLOSE
 from proxcgal.study.bootstrap import median_interval
-from proxcgal.study.figures import COLOURS, DASHED, DPI, GREY, LEGEND, NAMES
-from proxcgal.study.paired import Ends, Pairs, ends_of, pairs
+from proxcgal.study.campaign import file_name
+from proxcgal.study.paired import Distances, Pairs, draw_distances, pairs
+from proxcgal.study.plotting import (
+    CONTROLLER_COLOURS,
+    CONTROLLER_NAMES,
+    DASHED,
+    DOTTED,
+    GREY,
+    LEGEND,
+    new_figure,
+    tidy_axes,
+)
 from proxcgal.study.static.memory_share import MEASURES, WORSE_MM, Shares, shares
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-_DOTTED: Any = (0, (1, 1.5))
 _GAIN, _COST = "#333333", "#CC79A7"
 
 
+def figures(table: pl.DataFrame, _: Summary | None = None) -> dict[str, Figure]:
+    """Two a scene: distributions at the end, pairs, differences; what memory gives back."""
+    drawn: dict[str, Figure] = {}
+    for (scene,), own in table.group_by(["scene"], maintain_order=True):
+        drawn[scene_file(str(scene))] = scene_figure(str(scene), own)
+        drawn[memory_file(str(scene))] = memory_figure(str(scene), own)
+    return drawn
+
+
+def scene_file(scene: str) -> str:
+    """Name of a scene's figure."""
+    return f"{file_name(scene)}.png"
+
+
+def memory_file(scene: str) -> str:
+    """Name of the figure of what memory gives back."""
+    return f"{file_name(scene)}_memory.png"
+
+
 def scene_figure(scene: str, table: pl.DataFrame) -> Figure:
-    """Ends of all controllers, pairs of wb and sm, differences: over the draws of one scene.
+    """Distances of all controllers, pairs of wb and sm, differences: over the draws of one scene.
 
     Args:
         scene: its name, above the figure.
         table: its trials; those that failed, or see no panel, are left out.
     """
-    ends = ends_of(table)
-    figure = Figure(figsize=(10.2, 3.7), dpi=DPI, layout="constrained")
-    FigureCanvasAgg(figure)
-    figure.suptitle(
-        f"{scene}: {table['draw'].n_unique()} random scenes", fontsize=12, fontweight="bold"
-    )
+    ends = draw_distances(table)
+    figure = new_figure(10.2, 3.7, f"{scene}: {table['draw'].n_unique()} random scenes")
     axes = figure.subplots(1, 3, width_ratios=(1.1, 1.0, 1.1))
     _ends(axes[0], ends)
     _pairs(axes[1], pairs(ends, "wb", "sm"))
     _differences(axes[2], ends)
     for letter, ax in zip("abc", axes, strict=True):
-        ax.tick_params(labelsize=9)
-        ax.spines[["top", "right"]].set_visible(False)
+        tidy_axes(ax)
         ax.set_title(f"({letter})", loc="left", fontsize=10)
     lines = [line for ax in axes[::2] for line in ax.get_legend_handles_labels()[0]]
     figure.legend(
@@ -57,15 +76,12 @@ def memory_figure(scene: str, table: pl.DataFrame) -> Figure:
         scene: its name, above the figure.
         table: its trials.
     """
-    figure = Figure(figsize=(7.6, 4.3), dpi=DPI, layout="constrained")
-    FigureCanvasAgg(figure)
-    figure.suptitle(f"{scene}: memory against the cost of sensing", fontsize=12, fontweight="bold")
+    figure = new_figure(7.6, 4.3, f"{scene}: memory against the cost of sensing")
     titles = ("(a) at the end", "(b) at the nearest")
     for ax, measure, title in zip(figure.subplots(1, 2), MEASURES, titles, strict=True):
         _regained(ax, shares(table, measure))
         ax.set_title(title, loc="left", fontsize=10)
-        ax.tick_params(labelsize=9)
-        ax.spines[["top", "right"]].set_visible(False)
+        tidy_axes(ax)
     return figure
 
 
@@ -74,49 +90,55 @@ def _regained(ax: Axes, of: Shares) -> None:
     low, high = min(all_mm) - 10.0, max(all_mm) + 10.0
     ax.plot((low, high), (low, high), color=GREY, linewidth=1.0)
     ax.axhline(0.0, color=GREY, linewidth=1.0)
-    ax.axhline(-WORSE_MM, color=GREY, linewidth=1.0, linestyle=_DOTTED)
-    ax.scatter(of.lost, of.regained, s=14, color=COLOURS["wb_memory"], alpha=0.6, linewidths=0.0)
-    ax.set_xlim(low, high)
-    ax.set_ylim(low, high)
-    ax.set_aspect("equal")
-    ax.set_xlabel("cost of sensing, known - WB [mm]", fontsize=10)
-    ax.set_ylabel("regained, memory - WB [mm]", fontsize=10)
+    ax.axhline(-WORSE_MM, color=GREY, linewidth=1.0, linestyle=DOTTED)
+    ax.scatter(
+        of.lost, of.regained, s=14, color=CONTROLLER_COLOURS["wb_memory"], alpha=0.6, linewidths=0.0
+    )
+    ax.set(
+        xlim=(low, high),
+        ylim=(low, high),
+        aspect="equal",
+        xlabel="cost of sensing, known - WB [mm]",
+        ylabel="regained, memory - WB [mm]",
+    )
 
 
-def _ends(ax: Axes, ends: Ends) -> None:
+def _ends(ax: Axes, ends: Distances) -> None:
     for name, by_draw in ends.items():
         ax.ecdf(
-            list(by_draw.values()), color=COLOURS.get(name, "black"), label=NAMES.get(name, name),
-            linewidth=1.6, linestyle=DASHED if name == "wb_memory" else "-",
+            list(by_draw.values()), color=CONTROLLER_COLOURS.get(name, "black"),
+            label=CONTROLLER_NAMES.get(name, name), linewidth=1.6,
+            linestyle=DASHED if name == "wb_memory" else "-",
         )  # fmt: skip
-    ax.axvline(TOO_CLOSE, color=GREY, linewidth=1.0, linestyle=_DOTTED)
-    ax.set_xlim(left=0.0)
-    ax.set_xlabel("true distance at the end [m]", fontsize=10)
-    ax.set_ylabel("share of draws [-]", fontsize=10)
+    ax.axvline(TOO_CLOSE, color=GREY, linewidth=1.0, linestyle=DOTTED)
+    ax.set(xlim=(0.0, None), xlabel="true distance at the end [m]", ylabel="share of draws [-]")
 
 
 def _pairs(ax: Axes, both: Pairs) -> None:
     top = 1.05 * max([0.1, *both.one, *both.other])
-    ax.plot((0.0, top), (0.0, top), color=GREY, linewidth=1.0, linestyle=_DOTTED)
-    ax.scatter(both.other, both.one, s=14, color=COLOURS["wb"], alpha=0.6, linewidths=0.0)
-    ax.set_xlim(0.0, top)
-    ax.set_ylim(0.0, top)
-    ax.set_aspect("equal")
-    ax.set_xlabel("sm, true distance at the end [m]", fontsize=10)
-    ax.set_ylabel("wb, true distance at the end [m]", fontsize=10)
+    ax.plot((0.0, top), (0.0, top), color=GREY, linewidth=1.0, linestyle=DOTTED)
+    ax.scatter(
+        both.other, both.one, s=14, color=CONTROLLER_COLOURS["wb"], alpha=0.6, linewidths=0.0
+    )
+    ax.set(
+        xlim=(0.0, top),
+        ylim=(0.0, top),
+        aspect="equal",
+        xlabel="sm, true distance at the end [m]",
+        ylabel="wb, true distance at the end [m]",
+    )
 
 
-def _differences(ax: Axes, ends: Ends) -> None:
+def _differences(ax: Axes, ends: Distances) -> None:
     for one, other, colour, label in (
         ("wb", "sm", _GAIN, "gain, WB - SM"),
         ("wb_known", "wb", _COST, "cost of sensing, known - WB"),
-        ("wb_memory", "wb", COLOURS["wb_memory"], "memory - WB"),
+        ("wb_memory", "wb", CONTROLLER_COLOURS["wb_memory"], "memory - WB"),
     ):
         apart = pairs(ends, one, other).apart_mm
         interval = median_interval(apart)
         if interval is not None:
             ax.ecdf(apart, color=colour, label=label, linewidth=1.6)
             ax.axvspan(interval.low, interval.high, color=colour, alpha=0.18, linewidth=0.0)
-    ax.axvline(0.0, color=GREY, linewidth=1.0, linestyle=_DOTTED)
-    ax.set_xlabel("difference at the end [mm]", fontsize=10)
-    ax.set_ylabel("share of draws [-]", fontsize=10)
+    ax.axvline(0.0, color=GREY, linewidth=1.0, linestyle=DOTTED)
+    ax.set(xlabel="difference at the end [mm]", ylabel="share of draws [-]")

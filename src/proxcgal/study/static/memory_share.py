@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import polars as pl
@@ -11,10 +11,7 @@ import polars as pl
 from proxcgal.core.typing import Array
 from proxcgal.evaluation.metrics import NOTHING_M, Summary
 from proxcgal.study.bootstrap import ENOUGH, ratio_interval
-from proxcgal.study.paired import ends_of
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
+from proxcgal.study.paired import draw_distances
 
 WORSE_MM = 20.0  # nearer than without memory by more than this, a draw is listed
 _ANOTHER_WAY_M = 0.05  # goal errors so far apart are of two ways
@@ -37,7 +34,7 @@ def shares(table: pl.DataFrame, measure: str) -> Shares:
         table: a row a trial.
         measure: one of MEASURES.
     """
-    ends = ends_of(table, measure)
+    ends = draw_distances(table, measure)
     wb, known, memory = (ends.get(name, {}) for name in ("wb", "wb_known", "wb_memory"))
     draws = tuple(sorted(wb.keys() & known.keys() & memory.keys()))
     return Shares(
@@ -63,9 +60,9 @@ def memory_summary(table: pl.DataFrame) -> Summary | None:
             "pairs": len(of.draws),
             "lost_mean_mm": float(of.lost.mean()),
             "regained_mean_mm": float(of.regained.mean()),
-            "closed_share": interval.middle,
-            "low": interval.low,
-            "high": interval.high,
+            "closed_share": interval and interval.middle,
+            "low": interval and interval.low,
+            "high": interval and interval.high,
             "worse": [
                 _worse(table, draw, measure, float(apart))
                 for draw, apart in zip(of.draws, of.regained, strict=True)
@@ -88,8 +85,8 @@ def _worse(table: pl.DataFrame, draw: int, measure: str, apart_mm: float) -> Sum
 
 def _reason(wb: Summary, memory: Summary, moment: str) -> str:
     """Where the ways part, then what each trial knew at its own moment, true_min or true_final."""
-    told = (_parting(wb, memory), _knew(memory, moment, "with it"), _knew(wb, moment, "without"))
-    return "; ".join(told)
+    known = (_knew(memory, moment, "with it"), _knew(wb, moment, "without"))
+    return "; ".join((_parting(wb, memory), *known))
 
 
 def _parting(wb: Summary, memory: Summary) -> str:
@@ -104,9 +101,9 @@ def _parting(wb: Summary, memory: Summary) -> str:
 def _knew(row: Summary, moment: str, name: str) -> str:
     """One trial at one moment: which link came how near to what, and what was believed then."""
     link = row[f"{moment}_link"] or "the arm"
-    told = f"{name}, at {row[f'{moment}_s']:.1f} s {link} is nearest, to what "
+    text = f"{name}, at {row[f'{moment}_s']:.1f} s {link} is nearest, to what "
     age = row[f"sighting_age_at_{moment}_s"]
-    told += {
+    text += {
         "in_view": "was in view",
         "remembered": f"was last in view {_ago(age)}, so within the memory's time",
         "forgotten": f"was last in view {_ago(age)}, longer than the memory's time",
@@ -114,10 +111,10 @@ def _knew(row: Summary, moment: str, name: str) -> str:
     }[row[f"sighting_at_{moment}"]]
     seen = row[f"seen_at_{moment}_m"]
     if seen >= NOTHING_M:
-        return f"{told}; nothing was believed near"
+        return f"{text}; nothing was believed near"
     believed = row[f"believed_at_{moment}_link"]
     at = f" at {believed}" if believed else ""
-    return f"{told}, and the nearest believed was {seen:.3f} m off{at}"
+    return f"{text}, and the nearest believed was {seen:.3f} m off{at}"
 
 
 def _ago(age: float | None) -> str:
@@ -147,20 +144,18 @@ def _percent(part: Summary) -> tuple[str, str, str]:
     return middle, low, high
 
 
-def memory_sentences(scene: str, found: Summary | None) -> list[str]:
+def memory_sentences(scene: str, found: Summary | None) -> Iterator[str]:
     """What memory closes, and each draw that it makes worse."""
     if found is None:
-        return []
-    told = []
+        return
     for measure, where in (("true_final_m", "at the end"), ("true_min_m", "at the nearest")):
         part = found[measure]
-        told.append(f"{scene}: {where} {_closed(part)}.")
-        told += [
-            f"{scene}, draw {case['draw']}: {where} nearer by {-case['apart_mm']:.0f} mm with "
-            f"memory: {case['reason']}."
-            for case in part["worse"]
-        ]
-    return told
+        yield f"{scene}: {where} {_closed(part)}."
+        for case in part["worse"]:
+            yield (
+                f"{scene}, draw {case['draw']}: {where} nearer by {-case['apart_mm']:.0f} mm with "
+                f"memory: {case['reason']}."
+            )
 
 
 def _closed(part: Summary) -> str:

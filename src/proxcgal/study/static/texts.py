@@ -1,19 +1,14 @@
-"""What the drawn static scenes amount to, for people: tables, sentences, figures."""
+"""Texts of the drawn static scenes: tables, verdicts, captions."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 from proxcgal.evaluation.metrics import SELF_LIMIT_M, Summary, shown
 from proxcgal.study.bootstrap import ENOUGH
-from proxcgal.study.campaign import plain
-from proxcgal.study.kind import Listing
-from proxcgal.study.static.figures import memory_figure, scene_figure
+from proxcgal.study.listing import Listing
+from proxcgal.study.static.figures import memory_file, scene_file
 from proxcgal.study.static.memory_share import memory_rows, memory_sentences
-
-if TYPE_CHECKING:
-    import polars as pl
-    from matplotlib.figure import Figure
 
 
 def listings(summary: Summary) -> list[Listing]:
@@ -90,9 +85,8 @@ def _pair_cells(paired: Summary | None) -> tuple[str, ...]:
     return (str(paired["pairs"]), *lengths, f"{100.0 * paired['positive_share']:.0f}")
 
 
-def verdicts(summary: Summary) -> list[str]:
+def verdicts(summary: Summary) -> Iterator[str]:
     """What the numbers say, a sentence a scene; then what was drawn again, and own links."""
-    told = []
     for scene, found in summary["scenes"].items():
         gain, cost = found["gain_mm"], found["sensing_cost_mm"]
         if gain is not None:
@@ -102,24 +96,23 @@ def verdicts(summary: Summary) -> list[str]:
             )
             if cost is not None:
                 text += f"; sensing costs wb {cost['median']:.0f} mm against a known scene"
-            told.append(text + ".")
+            yield text + "."
         ours = found["controllers"].get("wb", {})
         if ours.get("violating_trials"):
-            told.append(
+            yield (
                 f"{scene}: wb came under 0.05 m in {ours['violating_trials']} of {ours['trials']} "
                 f"trials, in {ours['unseen_trials']} of them unseen: the cloud showed nothing that "
                 "near."
             )
-        told += memory_sentences(scene, found["memory"])
+        yield from memory_sentences(scene, found["memory"])
         again = ", ".join(f"{reason} {count}" for reason, count in found["redrawn"].items())
-        told.append(f"{scene}: {found['draws']} draws; drawn again: {again or 'none'}.")
+        yield f"{scene}: {found['draws']} draws; drawn again: {again or 'none'}."
     if summary["self_under_limit"]:
-        told.append(
+        yield (
             f"Trials in which the arm came within {SELF_LIMIT_M} m of itself: "
             f"{summary['self_under_limit']}. By the rule of single runs these have failed; they "
             "are counted all the same: no law here avoids the own arm."
         )
-    return told
 
 
 def _sureness(paired: Summary) -> str:
@@ -132,30 +125,13 @@ def _sureness(paired: Summary) -> str:
     )
 
 
-def figures(table: pl.DataFrame, _: Summary | None = None) -> dict[str, Figure]:
-    """Two a scene: distributions at the end, pairs, differences; what memory gives back."""
-    drawn: dict[str, Figure] = {}
-    for (scene,), own in table.group_by(["scene"], maintain_order=True):
-        drawn[_file(str(scene))] = scene_figure(str(scene), own)
-        drawn[_memory_file(str(scene))] = memory_figure(str(scene), own)
-    return drawn
-
-
 def captions(summary: Summary) -> dict[str, str]:
     """What the figures show."""
-    told = {}
+    texts = {}
     for scene in summary["scenes"]:
-        told[_file(scene)] = f"{scene}: {_CAPTION}"
-        told[_memory_file(scene)] = f"{scene}: {_MEMORY_CAPTION}"
-    return told
-
-
-def _file(scene: str) -> str:
-    return f"{plain(scene)}.png"
-
-
-def _memory_file(scene: str) -> str:
-    return f"{plain(scene)}_memory.png"
+        texts[scene_file(scene)] = f"{scene}: {_CAPTION}"
+        texts[memory_file(scene)] = f"{scene}: {_MEMORY_CAPTION}"
+    return texts
 
 
 _MEMORY_CAPTION = (

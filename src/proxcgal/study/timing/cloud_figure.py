@@ -6,14 +6,19 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from proxcgal import _core
 from proxcgal.core.typing import Array
-from proxcgal.study.figures import DPI, LEGEND
-from proxcgal.study.pair_figure import PAIR_COLOUR, frame_3d, pair_arrow, surface_points
+from proxcgal.study.pair_figure import (
+    PAIR_COLOUR,
+    caption_3d,
+    draw_pair_arrow,
+    frame_3d,
+    surface_points,
+)
+from proxcgal.study.plotting import LEGEND, new_figure
 from proxcgal.study.timing.inputs import Inputs
 
 RAW_COLOUR, NEAR_COLOUR, ROBOT_COLOUR = "#3A7BDB", "#17803D", "#404040"
@@ -35,12 +40,8 @@ def cloud_figure(
     """
     rows = 1 + len(grid) // 2
     height = 3.5 * rows + 0.9
-    figure = Figure(figsize=(7.4, height), dpi=DPI)
-    FigureCanvasAgg(figure)
-    name = grid[0].robot.name
-    figure.suptitle(
-        f"{name}: clouds and closest pair", fontsize=12, fontweight="bold", y=1.0 - 0.12 / height
-    )
+    title = f"{grid[0].robot.name}: clouds and closest pair"
+    figure = new_figure(7.4, height, title, layout=None, y=1.0 - 0.12 / height)
     figure.subplots_adjust(
         left=0.0, right=0.96, bottom=0.5 / height, top=1.0 - 0.75 / height, wspace=0.02, hspace=0.14
     )
@@ -48,7 +49,7 @@ def cloud_figure(
     ax = figure.add_subplot(rows, 2, 1, projection="3d")
     _draw_points(ax, grid[-1].points_W, finest, near_W, sizes=(3.0, 0.06, 3.0))
     frame_3d(ax, np.concatenate([grid[-1].points_W, finest]), bearing)
-    _caption(ax, 1.04, f"(a) all {len(grid[-1].points_W)} points sensed")
+    caption_3d(ax, 1.04, f"(a) all {len(grid[-1].points_W)} points sensed")
     everything_W = np.concatenate([finest, near_W])
     low, high = everything_W.min(axis=0), everything_W.max(axis=0)
     for place, inputs in enumerate(grid, 1):
@@ -61,11 +62,11 @@ def cloud_figure(
         ax.scatter(*surface_points(inputs.robot, inputs.q).T, zorder=0, **faint)
         size = float(np.clip(8000.0 / len(robot_W), 0.15, 6.0))
         _draw_points(ax, inputs.points_W[beside], robot_W, near_W, sizes=(7.0, size, 7.0))
-        pair_arrow(ax, np.asarray(pair.obstacle_W), np.asarray(pair.surface_W))
+        draw_pair_arrow(ax, np.asarray(pair.obstacle_W), np.asarray(pair.surface_W))
         frame_3d(ax, everything_W, bearing)
-        _caption(ax, 1.04, f"({'abcdefgh'[place]}) {inputs.vertices} vertices a link")
-        told = f"{pair.link}, {1000 * pair.distance:.1f} mm"
-        _caption(ax, 0.98, told, fontsize=9, color=PAIR_COLOUR)
+        caption_3d(ax, 1.04, f"({'abcdefgh'[place]}) {inputs.vertices} vertices a link")
+        text = f"{pair.link}, {1000 * pair.distance:.1f} mm"
+        caption_3d(ax, 0.98, text, fontsize=9, color=PAIR_COLOUR)
     dots: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 5}
     handles = [
         Line2D([], [], color=ROBOT_COLOUR, label="vertices of the robot", **dots),
@@ -86,11 +87,6 @@ def _draw_points(
     order = (sizes[1], sizes[0], sizes[2])
     for zorder, ((cloud_W, colour), size) in enumerate(zip(clouds, order, strict=True), 1):
         ax.scatter(*cloud_W.T, s=size, color=colour, zorder=zorder, **plain)
-
-
-def _caption(ax: Any, height: float, text: str, **style: Any) -> None:
-    style = {"fontsize": 10, **style}
-    ax.text2D(0.5, height, text, transform=ax.transAxes, ha="center", **style)
 
 
 def _vertices(inputs: Inputs) -> Array:

@@ -37,7 +37,7 @@ QUICK = Effort(seconds=0.15, rounds=3, most=600)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Cell:
+class TimingCell:
     """One cell's times, as a caller in Python meets them."""
 
     robot: str
@@ -107,7 +107,7 @@ def call_of(inputs: Inputs, algorithm: int, method: str) -> Callable[[], Any]:
     return partial(_core.closest_pair, inputs.robot, inputs.q, inputs.environment_W, method=method)
 
 
-def time_cells(grid: Iterable[Inputs], effort: Effort) -> Iterator[Cell]:
+def time_cells(grid: Iterable[Inputs], effort: Effort) -> Iterator[TimingCell]:
     """Measures both algorithms by both methods, one call after another on this thread.
 
     Raises:
@@ -119,7 +119,7 @@ def time_cells(grid: Iterable[Inputs], effort: Effort) -> Iterator[Cell]:
             _compare(inputs, algorithm, *(call() for call in calls.values()))
             points = inputs.points_W if algorithm == 1 else inputs.environment_W
             for method, samples_us in measure(calls, effort).items():
-                yield Cell(
+                yield TimingCell(
                     robot=inputs.robot.name, vertices=inputs.vertices, cloud=inputs.cloud,
                     points=len(points), algorithm=algorithm, method=method, samples_us=samples_us,
                 )  # fmt: skip
@@ -137,7 +137,7 @@ def _compare(inputs: Inputs, algorithm: int, paper: Any, fast: Any) -> None:
         )
 
 
-def sweep_summary(cells: Sequence[Cell], machine: str) -> Summary:
+def sweep_summary(cells: Sequence[TimingCell], machine: str) -> Summary:
     """Content of the grid's `summary.json`: `machine`, `cells`, `growth`."""
     return {
         "machine": machine,
@@ -146,7 +146,7 @@ def sweep_summary(cells: Sequence[Cell], machine: str) -> Summary:
     }
 
 
-def growth(cells: Sequence[Cell]) -> list[dict[str, Any]]:
+def growth(cells: Sequence[TimingCell]) -> list[dict[str, Any]]:
     """Fitted exponents with vertices and with points, beside those of the paper's formulas.
 
     Per robot, algorithm and method: time ~ x^exponent, fitted to the medians over all cells, with
@@ -164,8 +164,8 @@ def growth(cells: Sequence[Cell]) -> list[dict[str, Any]]:
         for axis, curve in (("vertices", "cloud"), ("points", "vertices")):
             x = [float(getattr(cell, axis)) for cell in own]
             curves = [getattr(cell, curve) for cell in own]
-            fitted, told = fit_growth(x, times, curves), fit_growth(x, costs, curves)
-            row[axis] = {**asdict(fitted), "formula": told.exponent} if fitted and told else None
+            fitted, cost = fit_growth(x, times, curves), fit_growth(x, costs, curves)
+            row[axis] = {**asdict(fitted), "formula": cost.exponent} if fitted and cost else None
         rows.append(row)
     return rows
 

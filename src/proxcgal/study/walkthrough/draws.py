@@ -11,12 +11,12 @@ import numpy as np
 from proxcgal.core.errors import ConfigError
 from proxcgal.scenario.loading import load_scenario
 from proxcgal.scenario.walkthrough import WalkScenario
-from proxcgal.study.trials import robot_of
+from proxcgal.study.trial_simulation import robot_of
 from proxcgal.trial.walkthrough.intended_path import IntendedPath
 from proxcgal.trial.walkthrough.setup import WalkSetup
 
 #: What an operator does, and the scenario that it is drawn round.
-WISHES = {
+BEHAVIOURS = {
     "compliant": "walkthrough_teach",
     "overspeed": "walkthrough_overspeed",
     "too_close": "walkthrough_too_close",
@@ -31,9 +31,9 @@ HAND = {
     "reaction_time": (0.15, 0.35), "max_force": (90.0, 150.0),
 }  # fmt: skip
 HUMAN = {"radius": (0.17, 0.23), "height": (1.55, 1.95)}
-COMPLIANT_SHARE = 0.85  # of each bound, at most, that a compliant wish asks for
+COMPLIANT_SHARE = 0.85  # of each bound, at most, on a compliant path
 COMPLIANT_CLEARANCE_M = 0.02  # beyond the minimum distance
-_STEP = 0.005  # [s] at which a wish is looked at
+_STEP = 0.005  # [s] at which a path is checked
 _TRIES = 200
 
 
@@ -41,21 +41,21 @@ _TRIES = 200
 class WalkDraw:
     """One operator with a path."""
 
-    wish: str  # one of WISHES
+    behaviour: str  # one of BEHAVIOURS
     source: str
     overrides: tuple[str, ...]  # of the source
     scenario: WalkScenario
     redrawn: int  # compliant paths that were not, before this one
 
 
-def draw_walk(wish: str, seed: int, number: int, more: Sequence[str] = ()) -> WalkDraw:
-    """The operator of that number: the same for the same wish, seed and number.
+def draw_walk(behaviour: str, seed: int, number: int, more: Sequence[str] = ()) -> WalkDraw:
+    """The operator of that number: the same for the same behaviour, seed and number.
 
     A compliant path is drawn again until the arm, following it exactly, keeps within 0.85 of every
     bound on speeds and accelerations and 0.02 m off the minimum distance.
 
     Args:
-        wish: one of WISHES.
+        behaviour: one of BEHAVIOURS.
         seed: of the campaign.
         number: of the draw, from 0.
         more: assignments that hold for all draws.
@@ -63,26 +63,26 @@ def draw_walk(wish: str, seed: int, number: int, more: Sequence[str] = ()) -> Wa
     Raises:
         ConfigError: hardly any draw would do, or an assignment that does not fit.
     """
-    generator = np.random.default_rng([seed, list(WISHES).index(wish), number])
+    generator = np.random.default_rng([seed, list(BEHAVIOURS).index(behaviour), number])
     reasons: Counter[str] = Counter()
     for tries in range(_TRIES):
-        legs = _LEGS[wish](generator)
+        legs = _LEGS[behaviour](generator)
         overrides = (
             f"leg=[{', '.join(legs)}]",
             *(f"hand.{k}={generator.uniform(*spread):.4g}" for k, spread in HAND.items()),
             *(f"guard.human.{k}={generator.uniform(*spread):.3f}" for k, spread in HUMAN.items()),
             *more,
         )
-        scenario = load_scenario(WISHES[wish], overrides)
+        scenario = load_scenario(BEHAVIOURS[behaviour], overrides)
         assert isinstance(scenario, WalkScenario)
-        if wish != "compliant" or (reason := _beyond(scenario)) is None:
+        if behaviour != "compliant" or (reason := _beyond(scenario)) is None:
             return WalkDraw(
-                wish=wish, source=WISHES[wish], overrides=overrides, scenario=scenario,
-                redrawn=tries,
+                behaviour=behaviour, source=BEHAVIOURS[behaviour], overrides=overrides,
+                scenario=scenario, redrawn=tries,
             )  # fmt: skip
         reasons[reason] += 1
-    told = ", ".join(f"{reason} {count} times" for reason, count in reasons.most_common())
-    raise ConfigError(f"walkthrough: none of {_TRIES} compliant paths will do: {told}")
+    counts = ", ".join(f"{reason} {count} times" for reason, count in reasons.most_common())
+    raise ConfigError(f"walkthrough: none of {_TRIES} compliant paths will do: {counts}")
 
 
 def _leg(to: Sequence[float], turn: Sequence[float], **keys: float) -> str:
@@ -145,16 +145,16 @@ _LEGS = {
 
 
 def _beyond(scenario: WalkScenario) -> str | None:
-    """Why a wish is not compliant; None where it is. The arm is thought to follow it exactly."""
+    """Why a path is not compliant; None where it is. The arm is assumed to follow it exactly."""
     setup = WalkSetup.of(scenario, robot_of(scenario))
     robot, keys = setup.robot, scenario.guard
-    wish = IntendedPath.of(scenario.legs, _STEP)
+    path = IntendedPath.of(scenario.legs, _STEP)
     bounds = setup.bounds
     q, qd = setup.q0.copy(), np.zeros(robot.n_q)
     guard = setup.make_guard()
     share, clearance = COMPLIANT_SHARE, keys.min_distance + COMPLIANT_CLEARANCE_M
-    for row in range(len(wish)):
-        twist = np.concatenate([wish.velocity[row], wish.spin[row]])
+    for row in range(len(path)):
+        twist = np.concatenate([path.velocity[row], path.spin[row]])
         before, qd = qd, np.linalg.solve(robot.tool_jacobian(q), twist)
         if (np.abs(qd) > share * np.array(bounds.qd_bounds)).any():
             return "joint speed"

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from proxcgal.core.typing import Array
-from proxcgal.study.figures import DASHED, DPI, GREY, LEGEND
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from proxcgal.trial.walkthrough.log import WalkLog
-    from proxcgal.trial.walkthrough.run import WalkResult
-
-    Array = Array
+from proxcgal.study.plotting import (
+    DASHED,
+    DOTTED,
+    GREY,
+    LEGEND,
+    legend_below,
+    new_figure,
+    tidy_axes,
+)
+from proxcgal.trial.walkthrough.log import WalkLog
+from proxcgal.trial.walkthrough.run import WalkResult
 
 BLUE, ORANGE, RED, GREEN = "#0072B2", "#E69F00", "#D55E00", "#009E73"
 SCALE = 1.08  # of the tallest curve: how high the STO signal is drawn
@@ -47,15 +48,12 @@ def trip_figure(log: WalkLog, *, title: str, window: Sequence[float] | None = No
     elif trip.function == "joint_acceleration":
         rows.insert(0, (log.acceleration_ratio, 1.0, "joint accel., of its bound [-]", True))
     inside = (trip.time_s - _BEFORE, trip.time_s + _AFTER) if window is None else window
-    figure = Figure(figsize=(8.4, 1.0 + 2.3 * len(rows)), dpi=DPI, layout="constrained")
-    FigureCanvasAgg(figure)
-    figure.suptitle(title, fontsize=12, fontweight="bold")
+    figure = new_figure(8.4, 1.0 + 2.3 * len(rows), title)
     axes = figure.subplots(len(rows), 2, squeeze=False, width_ratios=(1.5, 1.0), sharey="row")
     for (whole, near), (values, limit, label, own) in zip(axes, rows, strict=True):
         for ax in (whole, near):
             _curve(ax, log, values, limit if own else None)
-        whole.set_ylabel(label, fontsize=10)
-        whole.set_xlim(0.0, log.time[-1])
+        whole.set(ylabel=label, xlim=(0.0, log.time[-1]))
         whole.axvspan(*inside, color=GREY, alpha=0.10, lw=0)
         near.set_xlim(*inside)
         near.axvline(trip.time_s, color=RED, lw=0.9, ls=DASHED)
@@ -65,8 +63,7 @@ def trip_figure(log: WalkLog, *, title: str, window: Sequence[float] | None = No
     _stop_arrow(axes[-1][1], log)
     for ax in axes[-1]:
         ax.set_xlabel("time [s]", fontsize=10)
-    handles, labels = axes[0][0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3, **LEGEND)
+    legend_below(figure, axes[0][0].get_legend_handles_labels()[0])
     return figure
 
 
@@ -75,13 +72,12 @@ def _curve(ax: Axes, log: WalkLog, values: Array, limit: float | None) -> None:
     top = SCALE * max(float(finite.max(initial=0.0)), limit or 0.0)
     ax.plot(log.time, values, color=BLUE, lw=1.4, label="measured")
     if limit is not None:
-        ax.axhline(limit, color=GREY, lw=1.0, ls=(0, (1, 1.5)), label="limit")
+        ax.axhline(limit, color=GREY, lw=1.0, ls=DOTTED, label="limit")
     ax.step(log.time, np.where(log.torque, top, 0.0), color=ORANGE, lw=1.3, where="post",
             label="STO, scaled")  # fmt: skip
     low = min(0.0, float(finite.min(initial=0.0)))
     ax.set_ylim(1.05 * low, 1.06 * top)
-    ax.spines[["top", "right"]].set_visible(False)
-    ax.tick_params(labelsize=9)
+    tidy_axes(ax)
 
 
 def _stop_arrow(ax: Axes, log: WalkLog) -> None:
@@ -104,9 +100,7 @@ def teach_figure(result: WalkResult, *, title: str, hand_guiding: float) -> Figu
     log, path, played = result.log, result.path, result.played
     assert path is not None
     assert played is not None
-    figure = Figure(figsize=(8.4, 6.6), dpi=DPI, layout="constrained")
-    FigureCanvasAgg(figure)
-    figure.suptitle(title, fontsize=12, fontweight="bold")
+    figure = new_figure(8.4, 6.6, title)
     grid = figure.add_gridspec(3, 2, height_ratios=(1.5, 1.5, 1.0))
     speed, distance = figure.add_subplot(grid[0, :]), figure.add_subplot(grid[1, 0])
     plane, error = figure.add_subplot(grid[1, 1]), figure.add_subplot(grid[2, :])
@@ -118,37 +112,37 @@ def teach_figure(result: WalkResult, *, title: str, hand_guiding: float) -> Figu
         speed.plot(
             slow.time, slow.tcp_speed, color=GREEN, lw=1.2, label="by the hand-guiding rules"
         )
-        speed.axhline(hand_guiding, color=GREEN, lw=0.9, ls=(0, (1, 1.5)))
+        speed.axhline(hand_guiding, color=GREEN, lw=0.9, ls=DOTTED)
     speed.plot(log.time, log.tcp_speed, color=BLUE, lw=1.4, label="at the process's speed")
-    speed.axhline(log.tcp_limit, color=GREY, lw=1.0, ls=(0, (1, 1.5)), label="limits")
-    speed.set_ylabel("tool speed [m/s]", fontsize=10)
-    speed.set_xlabel("time [s]", fontsize=10)
-    speed.set_xlim(left=0.0)
-    speed.set_ylim(0.0, 1.06 * top)
+    speed.axhline(log.tcp_limit, color=GREY, lw=1.0, ls=DOTTED, label="limits")
+    speed.set(
+        ylabel="tool speed [m/s]", xlabel="time [s]", xlim=(0.0, None), ylim=(0.0, 1.06 * top)
+    )
     speed.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4, **LEGEND)
     distance.plot(log.time, log.distance, color=BLUE, lw=1.4, label="distance")
     distance.plot(log.time, log.protective_m, color=RED, lw=1.1, label="ISO/TS 15066 would ask for")
-    distance.axhline(log.distance_limit, color=GREY, lw=1.0, ls=(0, (1, 1.5)), label="limit")
-    distance.set_ylim(0.0, 1.5 * float(log.protective_m.max()))
-    distance.set_ylabel("robot to operator [m]", fontsize=10)
-    distance.set_xlabel("time [s]", fontsize=10)
+    distance.axhline(log.distance_limit, color=GREY, lw=1.0, ls=DOTTED, label="limit")
+    distance.set(
+        ylim=(0.0, 1.5 * float(log.protective_m.max())),
+        ylabel="robot to operator [m]",
+        xlabel="time [s]",
+    )
     distance.legend(loc="upper left", ncols=1, **LEGEND)
     taught, ran = path.raw_tool_W, played.log.tool_W[-len(played.error_m) :]
     plane.plot(taught[:, 1], taught[:, 2], color=BLUE, lw=2.4, alpha=0.5, label="taught")
     plane.plot(ran[:, 1], ran[:, 2], color="black", lw=0.8, label="played back")
     plane.set_aspect("equal", adjustable="datalim")
-    plane.set_xlabel("y [m]", fontsize=10)
-    plane.set_ylabel("z [m]", fontsize=10)
+    plane.set(xlabel="y [m]", ylabel="z [m]")
     plane.legend(loc="upper right", **LEGEND)
     times = np.arange(len(played.error_m)) * log.period
     error.plot(times, 1000.0 * played.error_m, color=BLUE, lw=1.2)
-    error.set_ylabel("played\nfrom taught [mm]", fontsize=10)
-    error.set_xlabel("time of the playback [s]", fontsize=10)
-    error.set_xlim(0.0, times[-1])
-    error.set_ylim(bottom=0.0)
-    for ax in (speed, distance, plane, error):
-        ax.spines[["top", "right"]].set_visible(False)
-        ax.tick_params(labelsize=9)
+    error.set(
+        ylabel="played\nfrom taught [mm]",
+        xlabel="time of the playback [s]",
+        xlim=(0.0, times[-1]),
+        ylim=(0.0, None),
+    )
+    tidy_axes(speed, distance, plane, error)
     return figure
 
 
@@ -159,8 +153,7 @@ def ratings_figure(ratings: Mapping[str, Sequence[float]]) -> Figure:
         ratings: 0 to 10 of each tester, by indicator.
     """
     count = max(len(ratings), 1)
-    figure = Figure(figsize=(6.4, 0.4 + 2.5 * count), dpi=DPI, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(6.4, 0.4 + 2.5 * count)
     grid = figure.subplots(count, 2, squeeze=False, width_ratios=(1.0, 2.2))
     for (box, bars), (name, values) in zip(grid, ratings.items(), strict=True):
         box.boxplot(
@@ -168,15 +161,10 @@ def ratings_figure(ratings: Mapping[str, Sequence[float]]) -> Figure:
             medianprops={"color": ORANGE, "lw": 1.8},
             meanprops={"marker": "^", "markerfacecolor": GREEN, "markeredgecolor": GREEN},
         )  # fmt: skip
-        box.set_ylim(-0.5, 10.5)
-        box.set_ylabel(f"{name}\nrating, 0 to 10", fontsize=10)
+        box.set(ylim=(-0.5, 10.5), ylabel=f"{name}\nrating, 0 to 10")
         edges = np.arange(-0.5, 11.0)
         share = np.histogram(values, edges)[0] / max(len(values), 1)
         bars.bar(np.arange(11), share, color=BLUE, width=0.8)
-        bars.set_xlabel("rating", fontsize=10)
-        bars.set_ylabel("share of testers", fontsize=10)
-        bars.set_xticks(range(11))
-        for ax in (box, bars):
-            ax.spines[["top", "right"]].set_visible(False)
-            ax.tick_params(labelsize=9)
+        bars.set(xlabel="rating", ylabel="share of testers", xticks=range(11))
+        tidy_axes(box, bars)
     return figure

@@ -19,7 +19,7 @@ AHEAD = 0.5  #: [s] that a recomputed command is followed for, to be seen
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Replayed:
+class ReplayedRun:
     """A run's moments, evenly in time."""
 
     model: SceneModel
@@ -29,14 +29,14 @@ class Replayed:
     ticks: int  #: of the recording
 
 
-def replayed(
+def replay_moments(
     recording: Recording,
     hz: float,
     controller: str | None = None,
     overrides: Sequence[str] = (),
     *,
     ahead: bool = False,
-) -> Replayed:
+) -> ReplayedRun:
     """Computes a recording again, which gives its clouds too.
 
     Args:
@@ -57,7 +57,9 @@ def replayed(
             _moment(setup, None, tick, q, float(time))
             for tick, q, time in zip(recording.ticks, recording.postures(), times, strict=True)
         ]
-        return Replayed(SceneModel.of(setup), settings.controller, tuple(moments), None, len(rows))
+        return ReplayedRun(
+            SceneModel.of(setup), settings.controller, tuple(moments), None, len(rows)
+        )
     again = Replay(recording, controller, overrides)
     period = again.ctrl.config.period
     step = max(round(1.0 / (hz * period)), 1)
@@ -70,7 +72,7 @@ def replayed(
             moments.append(_moment(again.setup, again, now, q, float(times[row])))
     if ahead:
         moments = [_ahead(again.setup, moment) for moment in moments]
-    return Replayed(
+    return ReplayedRun(
         SceneModel.of(again.setup), again.controller, tuple(moments), same, len(recording.ticks)
     )
 

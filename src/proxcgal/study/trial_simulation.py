@@ -6,28 +6,25 @@ import hashlib
 import warnings
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from proxcgal.core.errors import ConfigError, ModelWarning
+from proxcgal.models import Robot
 from proxcgal.recording.writer import RecordedTicks, Recorder
+from proxcgal.scenario.loading import Scenario
 from proxcgal.scenario.setup import make_robot
-from proxcgal.trial.trial import run_trial
-
-if TYPE_CHECKING:
-    from proxcgal.models import Robot
-    from proxcgal.scenario.loading import Scenario
-    from proxcgal.study.jobs import Report
-    from proxcgal.trial.trial import TrialLog
+from proxcgal.study.jobs import ShareReport
+from proxcgal.trial.trial import TrialLog, run_trial
 
 _KEPT = 4  # robots, with all that is made of them once
 _robots: dict[Any, Robot] = {}
 
 
-def simulate(
+def simulate_trial(
     scenario: Scenario,
     controller: str,
     seed: int,
-    report: Report,
+    report: ShareReport,
     *,
     recording: Path | None = None,
     ticks: RecordedTicks = "all",
@@ -42,20 +39,20 @@ def simulate(
         scenario: what to run.
         controller: one of CONTROLLERS.
         seed: instead of the scenario's.
-        report: is told the share done.
+        report: called with the share done.
         recording: where to record to; without, true distances are asked only where they decide.
         ticks: which of them the recording holds.
         robot_digest: of the robot that it must be; left out: any.
         without_truth: no true distances at all, without a recording.
-        coverage: tell what of the closest points was in view.
+        coverage: log which of the closest points were in view.
         truth_hz: true distances to the scene at least so often, where nothing is recorded.
 
     Raises:
         ProxError: what of the scenario does not fit, another robot; the simulator warned.
     """
     with warnings.catch_warnings():
-        # What there is to say of a model was said when the set-up was checked, and a recording
-        # that stops early is in the log.
+        # Warnings of a model were given when the set-up was checked; a recording that stops early
+        # is in the log.
         warnings.simplefilter("ignore", ModelWarning)
         warnings.simplefilter("ignore", RuntimeWarning)
         robot = robot_of(scenario, robot_digest)
@@ -103,7 +100,7 @@ def robot_of(scenario: Scenario, digest: str | None = None) -> Robot:
     return robot
 
 
-def identity(base: Scenario, robot: Robot) -> dict[str, str]:
-    """What a campaign's description says of a scene that its trials are made from."""
+def scene_digests(base: Scenario, robot: Robot) -> dict[str, str]:
+    """Digests of a scene and its robot, by name: part of the description of a campaign."""
     scene = hashlib.sha256(base.to_toml().encode()).hexdigest()[:16]
     return {f"scene {base.name}": scene, f"robot of {base.name}": robot.digest}

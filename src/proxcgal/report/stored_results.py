@@ -11,13 +11,15 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from proxcgal.core.errors import ConfigError
 
+SUMMARY, ORIGIN = "summary.json", "run.json"
+
 
 class _Stored(BaseModel):
     model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
 
 
-class Numbers(_Stored):
-    """One controller's, as `static_summary` has them."""
+class StoredNumbers(_Stored):
+    """Numbers of one controller, as `static_summary` has them."""
 
     true_min_m: float | None = None
     true_final_m: float | None = None
@@ -34,16 +36,16 @@ class StoredSummary(_Stored):
     scenario: str
     robot: str
     seed: int
-    recording: str | None = None  # who was beside the arm, where nobody was drawn
-    controllers: dict[str, Numbers]
+    recording: str | None = None  # of the person beside the arm, where none was drawn
+    controllers: dict[str, StoredNumbers]
     closest_points: dict[str, dict[str, float | None]] = {}  # shares of `sim.coverage`
     gain_mm: float | None = None
     self_min_m: float | None = None
     failed: bool = False
 
 
-class Trial(_Stored):
-    """What one trial took and found."""
+class StoredTrial(_Stored):
+    """Timings and findings of one trial."""
 
     wall_s: float
     tick_median_us: float
@@ -60,17 +62,7 @@ class About(_Stored):
     machine: str | None = None
     description: str = ""
     versions: dict[str, str] = {}
-    trials: dict[str, Trial] = {}
-
-
-@dataclass(frozen=True, slots=True)
-class Run:
-    """What one scenario's folder holds."""
-
-    folder: Path
-    summary: StoredSummary
-    about: About = field(default_factory=About)
-    settings: str = ""  # scenario.toml: the resolved scenario
+    trials: dict[str, StoredTrial] = {}
 
 
 class StoredCell(_Stored):
@@ -88,7 +80,7 @@ class StoredCell(_Stored):
 
 
 class Exponent(_Stored):
-    """How a time grows, and how the paper's formula does."""
+    """Growth of a time, and of the paper's formula."""
 
     exponent: float
     low: float | None = None
@@ -97,7 +89,7 @@ class Exponent(_Stored):
 
 
 class StoredGrowth(_Stored):
-    """Of one robot, algorithm and method."""
+    """Growth of one robot, algorithm and method."""
 
     robot: str
     algorithm: int
@@ -106,7 +98,7 @@ class StoredGrowth(_Stored):
     points: Exponent | None = None
 
 
-class StoredSweep(_Stored):
+class SweepSummary(_Stored):
     """`summary.json` of the timing grid."""
 
     machine: str
@@ -115,121 +107,92 @@ class StoredSweep(_Stored):
 
 
 @dataclass(frozen=True, slots=True)
-class Sweep:
-    """What a timing grid's folder holds."""
+class StoredRun:
+    """One scenario's folder."""
 
     folder: Path
-    summary: StoredSweep
+    summary: StoredSummary
+    about: About = field(default_factory=About)
+    settings: str = ""  # scenario.toml: the resolved scenario
+
+
+@dataclass(frozen=True, slots=True)
+class StoredSweep:
+    """A timing grid's folder."""
+
+    folder: Path
+    summary: SweepSummary
     about: About
 
 
 @dataclass(frozen=True, slots=True)
-class StoredCampaign:
-    """What a campaign's folder holds, its trials apart."""
-
-    folder: Path
-    summary: dict[str, Any]  # as the kind of the campaign has it
-    about: About
-
-
-@dataclass(frozen=True, slots=True)
-class StoredWalk:
-    """What a walk-through's folder holds."""
+class StoredResults:
+    """The folder of a campaign, its trials apart, of joint runs, or of a walk-through."""
 
     folder: Path
     summary: dict[str, Any]
     about: About
-    settings: str  # scenario.toml
+    settings: str  # scenario.toml; empty where there is none
+
+    @property
+    def path(self) -> Path:
+        """Of the summary."""
+        return self.folder / SUMMARY
 
 
 M = TypeVar("M", bound=BaseModel)
 
 
-def read_walk(folder: Path) -> StoredWalk | None:
-    """The walk-through of a folder; None where its summary is of something else.
+def read_results(folder: Path) -> StoredResults:
+    """The results of a folder, whatever keys their summary has.
 
     Raises:
         ConfigError: no such folder, no summary in it, or files that cannot be read; all problems.
     """
-    made, settings, summary = (
-        folder / "run.json", folder / "scenario.toml", _json(folder / "summary.json")
-    )  # fmt: skip
-    if "trips" not in summary:
-        return None
-    return StoredWalk(
-        folder, summary, _model(About, made) if made.is_file() else About(),
-        settings.read_text(errors="replace") if settings.is_file() else "",
-    )  # fmt: skip
+    summary = read_json(folder / SUMMARY)
+    return StoredResults(folder, summary, _about(folder), _settings(folder))
 
 
-def read_campaign(folder: Path) -> StoredCampaign | None:
-    """The campaign of a folder; None where its summary is of something else.
-
-    Raises:
-        ConfigError: no such folder, no summary in it, or files that cannot be read; all problems.
-    """
-    made, summary = folder / "run.json", _json(folder / "summary.json")
-    if "campaign" not in summary:
-        return None
-    return StoredCampaign(folder, summary, _model(About, made) if made.is_file() else About())
+def read_sweep(folder: Path) -> StoredSweep:
+    """The timing grid of a folder. Raises: as `read_results`."""
+    about = _about(folder)
+    return StoredSweep(folder, _model(SweepSummary, folder / SUMMARY), about)
 
 
-def read_joint(folder: Path) -> StoredCampaign | None:
-    """One scene's runs of the 12-joint robot; None where its summary is of something else.
-
-    Raises: as `read_campaign`.
-    """
-    made, summary = folder / "run.json", _json(folder / "summary.json")
-    if "campaign" in summary or "runs" not in summary:
-        return None
-    return StoredCampaign(folder, summary, _model(About, made) if made.is_file() else About())
-
-
-def read_sweep(folder: Path) -> Sweep | None:
-    """The timing grid of a folder; None where its summary is of something else.
-
-    Raises:
-        ConfigError: no such folder, no summary in it, or files that cannot be read; all problems.
-    """
-    path, made = folder / "summary.json", folder / "run.json"
-    if "cells" not in _json(path):
-        return None
-    about = _model(About, made) if made.is_file() else About()
-    return Sweep(folder, _model(StoredSweep, path), about)
-
-
-def read_runs(folder: Path) -> tuple[list[Run], About]:
+def read_runs(folder: Path) -> tuple[list[StoredRun], About]:
     """The runs of a folder, one or several scenarios', and how the whole was made.
 
-    Raises:
-        ConfigError: no such folder, no summary in it, or files that cannot be read; all problems.
+    Raises: as `read_results`.
     """
-    path = folder / "summary.json"
-    content = _json(path)
+    path = folder / SUMMARY
+    content = read_json(path)
     if "scenarios" in content:
         names = content["scenarios"]
         if not isinstance(names, dict) or not names:
             raise ConfigError(f"{path}: scenarios: must be a table of summaries by name, not empty")
-        runs = [read_run(folder / _plain(name, path)) for name in names]
+        runs = [_run(folder / _plain(name, path)) for name in names]
     elif "controllers" in content:
-        runs = [read_run(folder)]
+        runs = [_run(folder)]
     else:
         raise ConfigError(
             f"{path}: holds neither `scenarios` nor `controllers`: no summary of a run"
         )
-    made = folder / "run.json"
-    return runs, _model(About, made) if made.is_file() else runs[0].about
+    return runs, _about(folder) if (folder / ORIGIN).is_file() else runs[0].about
 
 
-def read_run(folder: Path) -> Run:
-    """One scenario's folder. Raises: as `read_runs`."""
-    made, settings = folder / "run.json", folder / "scenario.toml"
-    return Run(
-        folder=folder,
-        summary=_model(StoredSummary, folder / "summary.json"),
-        about=_model(About, made) if made.is_file() else About(),
-        settings=settings.read_text(errors="replace") if settings.is_file() else "",
-    )
+def _run(folder: Path) -> StoredRun:
+    summary = _model(StoredSummary, folder / SUMMARY)
+    return StoredRun(folder, summary, _about(folder), _settings(folder))
+
+
+def _about(folder: Path) -> About:
+    made = folder / ORIGIN
+    return _model(About, made) if made.is_file() else About()
+
+
+def _settings(folder: Path) -> str:
+    path = folder / "scenario.toml"
+    return path.read_text(errors="replace") if path.is_file() else ""
 
 
 def _plain(name: str, path: Path) -> str:
@@ -239,7 +202,8 @@ def _plain(name: str, path: Path) -> str:
     return name
 
 
-def _json(path: Path) -> dict[str, object]:
+def read_json(path: Path) -> dict[str, Any]:
+    """A JSON object. Raises: ConfigError: no such folder or file, something else in it."""
     if not path.parent.is_dir():
         raise ConfigError(f"{path.parent}: no such folder")
     if not path.is_file():
@@ -255,7 +219,7 @@ def _json(path: Path) -> dict[str, object]:
 
 def _model(model: type[M], path: Path) -> M:
     try:
-        return model.model_validate(_json(path))
+        return model.model_validate(read_json(path))
     except ValidationError as error:
         lines = [
             f"{path}: {'.'.join(map(str, problem['loc']))}: {problem['msg']}"

@@ -4,20 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import zip_longest
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter
 
-from proxcgal.study.figures import DASHED, DPI, GREY, LEGEND
-from proxcgal.study.timing.grid import ALGORITHMS, Cell
+from proxcgal.study.plotting import DASHED, DOTTED, GREY, legend_below, new_figure, tidy_axes
+from proxcgal.study.timing.comparison import CYCLE_US
+from proxcgal.study.timing.grid import ALGORITHMS, TimingCell
 from proxcgal.study.timing.inputs import REACH
-from proxcgal.study.timing.ratios import CYCLE_US
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 CLOUD_COLOURS = {"raw": "#0072B2", "2m": "#D55E00", "1m": "#009E73"}
 CLOUD_NAMES = {"raw": "raw", "2m": "within 2 m", "1m": "within 1 m"}
@@ -25,11 +22,11 @@ STYLES: dict[str, dict[str, Any]] = {
     "paper": {"linestyle": "-", "marker": "o"},
     "fast": {"linestyle": DASHED, "marker": "s", "markerfacecolor": "white"},
 }
-_CYCLE: dict[str, Any] = {"color": GREY, "linewidth": 1.0, "linestyle": (0, (1, 1.5))}
+_CYCLE: dict[str, Any] = {"color": GREY, "linewidth": 1.0, "linestyle": DOTTED}
 METHOD_NAMES = {"paper": "literal (paper)", "fast": "accelerated (fast)"}
 
 
-def timing_figure(cells: Sequence[Cell], algorithm: int) -> Figure:
+def timing_figure(cells: Sequence[TimingCell], algorithm: int) -> Figure:
     """Median time against vertices, one curve a cloud and method, one panel a robot.
 
     The form of [WA] Fig. 10, which is of Algorithm 2; both axes logarithmic, since the two methods
@@ -41,21 +38,18 @@ def timing_figure(cells: Sequence[Cell], algorithm: int) -> Figure:
     """
     own = [cell for cell in cells if cell.algorithm == algorithm]
     robots = sorted({cell.robot for cell in own})
-    figure = Figure(figsize=(0.6 + 3.7 * len(robots), 4.4), dpi=DPI, layout="constrained")
-    FigureCanvasAgg(figure)
     title = f"Algorithm {algorithm}: {ALGORITHMS[algorithm]}"
-    figure.suptitle(title, fontsize=12, fontweight="bold")
+    figure = new_figure(0.6 + 3.7 * len(robots), 4.4, title)
     panels = figure.subplots(1, len(robots), sharey=True, squeeze=False)[0]
     for letter, robot, ax in zip("abcdefgh", robots, panels, strict=False):
         _draw_times(ax, [cell for cell in own if cell.robot == robot])
         ax.set_title(f"({letter}) {robot}", fontsize=10)
     panels[0].set_ylabel("median time of a call [ms]", fontsize=10)
-    handles = _legend(own)
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles) // 2, **LEGEND)
+    legend_below(figure, _legend(own), rows=2)
     return figure
 
 
-def _draw_times(ax: Axes, cells: Sequence[Cell]) -> None:
+def _draw_times(ax: Axes, cells: Sequence[TimingCell]) -> None:
     for cloud in REACH:
         for method, style in STYLES.items():
             curve = [c for c in cells if (c.cloud, c.method) == (cloud, method)]
@@ -65,17 +59,15 @@ def _draw_times(ax: Axes, cells: Sequence[Cell]) -> None:
                 color=CLOUD_COLOURS[cloud], markersize=4.5, linewidth=1.5, **style,
             )  # fmt: skip
     ax.axhline(CYCLE_US / 1000.0, zorder=1, **_CYCLE)
-    ax.set_xscale("log")
-    ax.set_yscale("log")
+    ax.set(xscale="log", yscale="log")
     for axis in (ax.xaxis, ax.yaxis):
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     ax.set_xlabel("vertices of each link", fontsize=10)
     ax.grid(which="major", color="#E4E4E4", linewidth=0.6)
-    ax.tick_params(labelsize=9)
-    ax.spines[["top", "right"]].set_visible(False)
+    tidy_axes(ax)
 
 
-def _legend(cells: Sequence[Cell]) -> list[Line2D]:
+def _legend(cells: Sequence[TimingCell]) -> list[Line2D]:
     """A row of clouds with their sizes above methods and the cycle, column by column."""
     clouds = []
     for cloud, colour in CLOUD_COLOURS.items():

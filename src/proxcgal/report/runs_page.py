@@ -1,4 +1,4 @@
-"""The HTML of a report on trials: tables, figures, what was found."""
+"""The HTML of a report on runs of scenes: tables, figures, findings."""
 
 from __future__ import annotations
 
@@ -6,16 +6,11 @@ from collections.abc import Iterator, Sequence
 from html import escape
 
 from proxcgal.evaluation.metrics import COVERAGE_KEYS, SELF_LIMIT_M, shown
-from proxcgal.report.document import (
-    PICTURE_BYTES,
-    REPLAY_BYTES,
-    document,
-    origin_part,
-    picture,
-)
+from proxcgal.report.document import Pictures, document, origin_part, recordings_part
+from proxcgal.report.html_table import cell, head, table_part
 from proxcgal.report.replays import Replays
-from proxcgal.report.stored import About, Numbers, Run
-from proxcgal.study.runs.pictures import MOVING
+from proxcgal.report.stored_results import About, StoredNumbers, StoredRun
+from proxcgal.study.runs.pictures import SIDE_BY_SIDE
 
 PICTURES = (
     (
@@ -37,7 +32,7 @@ PICTURES = (
         "Green: the pair that the avoidance acts on. The axes: the goal.",
     ),
 )
-PAPER = {
+PAPER_RESULTS = {
     "front_plane": "Fig. 7: WB keeps farther away, its control point on the flange; up to 100 mm "
     "more in all",
     "side_plane": "Fig. 8: a similar result; up to 100 mm more in all",
@@ -50,7 +45,7 @@ NAMES = {
 }
 
 
-def page(runs: Sequence[Run], about: About) -> str:
+def runs_page(runs: Sequence[StoredRun], about: About) -> str:
     """The page of these runs: valid HTML, everything inside.
 
     Args:
@@ -61,13 +56,13 @@ def page(runs: Sequence[Run], about: About) -> str:
     return document(title, _parts(runs, about))
 
 
-def _parts(runs: Sequence[Run], about: About) -> Iterator[str]:
+def _parts(runs: Sequence[StoredRun], about: About) -> Iterator[str]:
     yield from _introduction(runs)
     yield from _table(runs)
     yield from _verdict(runs)
-    replays = Replays(REPLAY_BYTES)
+    replays = Replays()
     played = [replays.of_runs(run.folder) for run in runs]
-    budget = PICTURE_BYTES - replays.used
+    pictures = Pictures(replays.used)
     for run, replay in zip(runs, played, strict=True):
         yield f"<h2>{escape(run.summary.scenario)}</h2>"
         if run.about.description:
@@ -75,40 +70,38 @@ def _parts(runs: Sequence[Run], about: About) -> Iterator[str]:
         if _beside_a_person(run):
             yield from _phases(run)
         for name, caption in _pictures(run):
-            part, used = picture(run.folder / name, caption, budget)
-            budget -= used
-            yield part
+            yield pictures.part(run.folder / name, caption)
         yield replay
         yield from _coverage(run)
         yield from _trials(run)
-        yield from _recordings(run)
+        yield from recordings_part(run.folder, _STEPS)
     yield from origin_part(about)
     for run in runs:
         if run.settings:
             yield f"<h3>Settings of {escape(run.summary.scenario)}</h3>"
-            yield f'<p class="soft">The resolved scenario ({escape("scenario.toml")}); '
+            yield '<p class="soft">The resolved scenario (scenario.toml); '
             yield "<code>proxcgal run</code> takes this file as it is.</p>"
             yield f"<pre>{escape(run.settings)}</pre>"
     yield from replays.parts()
 
 
-def _pictures(run: Run) -> Iterator[tuple[str, str]]:
+def _pictures(run: StoredRun) -> Iterator[tuple[str, str]]:
     """File and caption; of the moving picture with how near each arm came."""
     for name, caption in PICTURES:
         if name == "motion.gif":
             least = {
                 controller: run.summary.controllers[controller].true_min_m
-                for controller in MOVING
+                for controller in SIDE_BY_SIDE
                 if controller in run.summary.controllers
             }
-            told = [f"{c} {shown(value)} m" for c, value in least.items() if value is not None]
-            start = "The arm in motion" + (f"; least true distance: {', '.join(told)}" * bool(told))
+            near = [f"{c} {shown(value)} m" for c, value in least.items() if value is not None]
+            start = "The arm in motion" + (f"; least true distance: {', '.join(near)}" * bool(near))
             yield name, f"{start}. {caption}"
         else:
             yield name, caption
 
 
-def _introduction(runs: Sequence[Run]) -> Iterator[str]:
+def _introduction(runs: Sequence[StoredRun]) -> Iterator[str]:
     ran = {name for run in runs for name in run.summary.controllers}
     robots = ", ".join(sorted({str(run.summary.robot) for run in runs}))
     seeds = ", ".join(sorted({str(run.summary.seed) for run in runs}))
@@ -141,76 +134,81 @@ _MOVES = {
 }
 
 
-def _beside_a_person(run: Run) -> bool:
+def _beside_a_person(run: StoredRun) -> bool:
     return any(numbers.mean_m for numbers in run.summary.controllers.values())
 
 
-def _sent(runs: Sequence[Run]) -> str:
+def _sent(runs: Sequence[StoredRun]) -> str:
     if all(_beside_a_person(run) for run in runs):
         return "goes from way point to way point"
     return "is sent to a goal that lies beyond an obstacle"
 
 
-def _phases(run: Run) -> Iterator[str]:
+def _phases(run: StoredRun) -> Iterator[str]:
     """Mean distances beside a person."""
     phases = [*dict.fromkeys(p for n in run.summary.controllers.values() for p in n.mean_m)]
-    yield '<div class="scroll"><table><caption>Mean distance to the person, over the cycle and in '
-    yield "each phase: true, and seen (the filtered cloud's, moments without one left out)."
-    yield '</caption><thead><tr><th class="left">controller</th>'
+    heads = [head("controller", style="left")]
     for phase in phases:
-        yield f"<th>{escape(phase)}<small>true, m</small></th><th>seen<small>m</small></th>"
-    yield "</tr></thead><tbody>"
-    for name, numbers in run.summary.controllers.items():
-        yield f'<tr><td class="left">{escape(NAMES.get(name, name))}</td>'
-        for phase in phases:
-            means = numbers.mean_m.get(phase, {})
-            yield f"<td>{shown(means.get('true'))}</td><td>{shown(means.get('seen'))}</td>"
-        yield "</tr>"
-    yield "</tbody></table></div>"
+        heads += [head(phase, "true, m"), head("seen", "m")]
+    rows = [
+        [_named(name)]
+        + [
+            cell(shown(numbers.mean_m.get(phase, {}).get(which)))
+            for phase in phases
+            for which in ("true", "seen")
+        ]
+        for name, numbers in run.summary.controllers.items()
+    ]
+    return table_part(
+        heads, rows,
+        "Mean distance to the person, over the cycle and in each phase: true, and seen (the "
+        "filtered cloud's, moments without one left out).",
+    )  # fmt: skip
 
 
-def _table(runs: Sequence[Run]) -> Iterator[str]:
-    yield '<div class="scroll"><table><caption>True distances are exact meshes against the exact '
-    yield "scene; final is the mean of the last 2 s; a violation is a tick under 0.05 m; gain is "
-    yield "wb over sm. The paper gives curves and one number for all its experiments, no table."
-    yield "</caption>"
-    yield '<thead><tr><th class="left">scene</th><th class="left">controller</th>'
-    for name, unit in (
-        ("true min", "m"),
-        ("true final", "m"),
-        ("seen min", "m"),
-        ("goal error", "m"),
-        ("violations", "ticks"),
-        ("gain", "mm"),
-    ):
-        yield f"<th>{name}<small>{unit}</small></th>"
-    yield '<th class="left">the paper [WA]</th></tr></thead><tbody>'
-    for run in runs:
-        controllers = run.summary.controllers
-        for row, (name, numbers) in enumerate(controllers.items()):
-            yield "<tr>"
-            if row == 0:
-                span = f' rowspan="{len(controllers)}"'
-                yield f'<td class="left"{span}>{escape(run.summary.scenario)}</td>'
-            yield f'<td class="left">{escape(NAMES.get(name, name))}</td>'
-            for value in (
-                numbers.true_min_m,
-                numbers.true_final_m,
-                numbers.seen_min_m,
-                numbers.goal_error_m,
-            ):
-                yield f"<td>{shown(value)}</td>"
-            yield f"<td>{'-' if numbers.violations is None else numbers.violations}</td>"
-            if row == 0:
-                gain = run.summary.gain_mm
-                paper = escape(PAPER.get(run.summary.scenario, "-"))
-                yield f"<td{span}>{'-' if gain is None else f'{gain:+.0f}'}</td>"
-                yield f'<td class="text"{span}>{paper}</td>'
-            yield "</tr>"
-    yield "</tbody></table></div>"
+def _named(controller: str) -> str:
+    return cell(NAMES.get(controller, controller), "left")
 
 
-def _verdict(runs: Sequence[Run]) -> Iterator[str]:
+def _table(runs: Sequence[StoredRun]) -> Iterator[str]:
+    heads = [head("scene", style="left"), head("controller", style="left")]
+    heads += [
+        head(name, unit)
+        for name, unit in (
+            ("true min", "m"), ("true final", "m"), ("seen min", "m"), ("goal error", "m"),
+            ("violations", "ticks"), ("gain", "mm"),
+        )
+    ]  # fmt: skip
+    return table_part(
+        [*heads, head("the paper [WA]", style="left")],
+        (row for run in runs for row in _rows(run)),
+        "True distances are exact meshes against the exact scene; final is the mean of the last "
+        "2 s; a violation is a tick under 0.05 m; gain is wb over sm. The paper gives curves and "
+        "one number for all its experiments, no table.",
+    )
+
+
+def _rows(run: StoredRun) -> Iterator[Iterator[str]]:
+    """A row a controller; scene, gain and paper stand beside all of them."""
+    summary = run.summary
+    count, gain = len(summary.controllers), summary.gain_mm
+
+    def row(place: int, name: str, own: StoredNumbers) -> Iterator[str]:
+        if place == 0:
+            yield cell(summary.scenario, "left", rows=count)
+        yield _named(name)
+        for value in (own.true_min_m, own.true_final_m, own.seen_min_m, own.goal_error_m):
+            yield cell(shown(value))
+        yield cell("-" if own.violations is None else own.violations)
+        if place == 0:
+            yield cell("-" if gain is None else f"{gain:+.0f}", rows=count)
+            yield cell(PAPER_RESULTS.get(summary.scenario, "-"), "text", rows=count)
+
+    for place, (name, own) in enumerate(summary.controllers.items()):
+        yield row(place, name, own)
+
+
+def _verdict(runs: Sequence[StoredRun]) -> Iterator[str]:
     for run in runs:
         gain, ends = run.summary.gain_mm, run.summary.controllers
         if gain is not None and {"wb", "sm"} <= ends.keys() and not _beside_a_person(run):
@@ -238,54 +236,52 @@ def _sentence(text: str) -> str:
     return text[:1].upper() + text[1:].rstrip(". ") + "."
 
 
-def _coverage(run: Run) -> Iterator[str]:
-    """What the sensors had of the truly closest points, where a run asked."""
-    told = {
+def _coverage(run: StoredRun) -> Iterator[str]:
+    """View of the truly closest points, where a run logged it."""
+    found = {
         name: [shares.get(key) for key in COVERAGE_KEYS]
         for name, shares in run.summary.closest_points.items()
     }
-    if not any(share is not None for shares in told.values() for share in shares):
-        return
-    yield '<div class="scroll"><table><caption>The truly closest points of the scene: in view of a '
-    yield "sensor at the last scan; remembered, within the memory's time before (whether or not a "
-    yield "controller with memory ran); forgotten, longer ago; never seen.</caption>"
-    yield '<thead><tr><th class="left">controller</th>'
-    for name in ("in view", "remembered", "forgotten", "never seen"):
-        yield f"<th>{name}<small>%</small></th>"
-    yield "</tr></thead><tbody>"
-    for name, shares in told.items():
-        yield f'<tr><td class="left">{escape(NAMES.get(name, name))}</td>'
-        for share in shares:
-            yield f"<td>{'-' if share is None else f'{100.0 * share:.0f}'}</td>"
-        yield "</tr>"
-    yield "</tbody></table></div>"
+    if all(share is None for shares in found.values() for share in shares):
+        return iter(())
+    heads = [head(name, "%") for name in ("in view", "remembered", "forgotten", "never seen")]
+    rows = [
+        [_named(name), *(cell("-" if s is None else f"{100.0 * s:.0f}") for s in shares)]
+        for name, shares in found.items()
+    ]
+    return table_part(
+        [head("controller", style="left"), *heads], rows,
+        "The truly closest points of the scene: in view of a sensor at the last scan; remembered, "
+        "within the memory's time before (whether or not a controller with memory ran); forgotten, "
+        "longer ago; never seen.",
+    )  # fmt: skip
 
 
-def _trials(run: Run) -> Iterator[str]:
+def _trials(run: StoredRun) -> Iterator[str]:
     """Timings, modes and findings per trial."""
     if not run.about.trials:
-        return
-    yield '<div class="scroll"><table><caption>Time of one tick (perception and control, from '
-    yield "Python), least distance between own links, and what the monitor found "
-    yield "(reason: ticks).</caption>"
-    yield '<thead><tr><th class="left">controller</th><th>tick median<small>us</small></th>'
-    yield "<th>tick p99<small>us</small></th><th>wall<small>s</small></th>"
-    yield '<th>own links<small>m</small></th><th class="left">findings</th></tr></thead><tbody>'
-    for name, trial in run.about.trials.items():
-        numbers = run.summary.controllers.get(name, Numbers())
-        found = ", ".join(f"{reason}: {ticks}" for reason, ticks in trial.findings.items())
-        yield (
-            f'<tr><td class="left">{escape(name)}</td><td>{trial.tick_median_us:.0f}</td>'
-            f"<td>{trial.tick_p99_us:.0f}</td><td>{trial.wall_s:.1f}</td>"
-            f"<td>{shown(numbers.self_min_m)}</td>"
-            f'<td class="text">{escape(found) or "none"}</td></tr>'
+        return iter(())
+    heads = [
+        head(name, unit)
+        for name, unit in (
+            ("tick median", "us"), ("tick p99", "us"), ("wall", "s"), ("own links", "m")
         )
-    yield "</tbody></table></div>"
+    ]  # fmt: skip
+    own = {name: numbers.self_min_m for name, numbers in run.summary.controllers.items()}
+    rows = [
+        [
+            cell(name, "left"), cell(f"{trial.tick_median_us:.0f}"),
+            cell(f"{trial.tick_p99_us:.0f}"), cell(f"{trial.wall_s:.1f}"),
+            cell(shown(own.get(name))),
+            cell(", ".join(f"{why}: {n}" for why, n in trial.findings.items()) or "none", "text"),
+        ]
+        for name, trial in run.about.trials.items()
+    ]  # fmt: skip
+    return table_part(
+        [head("controller", style="left"), *heads, head("findings", style="left")], rows,
+        "Time of one tick (perception and control, from Python), least distance between own links, "
+        "and what the monitor found (reason: ticks).",
+    )  # fmt: skip
 
 
-def _recordings(run: Run) -> Iterator[str]:
-    files = sorted(run.folder.glob("*.mcap"))
-    if files:
-        names = ", ".join(f"<code>{escape(f.name)}</code>" for f in files)
-        yield f'<p class="soft">Recordings of every tick beside this page: {names}. '
-        yield "<code>proxcgal replay FILE</code> steps through one; Foxglove opens them.</p>"
+_STEPS = " <code>proxcgal replay FILE</code> steps through one; Foxglove opens them."

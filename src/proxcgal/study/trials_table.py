@@ -8,10 +8,10 @@ from collections.abc import Sequence
 import polars as pl
 
 from proxcgal.study.campaign import Ended
-from proxcgal.study.store import Row
+from proxcgal.study.campaign_store import Row
 
 
-def tidy(ended: Sequence[Ended], columns: Sequence[str]) -> pl.DataFrame:
+def trials_table(ended: Sequence[Ended], columns: Sequence[str]) -> pl.DataFrame:
     """One row a trial in the campaign's order: what it is, its numbers, what it took.
 
     Args:
@@ -34,7 +34,7 @@ def tidy(ended: Sequence[Ended], columns: Sequence[str]) -> pl.DataFrame:
     return table.with_columns(pl.col(empty).cast(pl.Float64))
 
 
-def parquet(table: pl.DataFrame) -> bytes:
+def parquet_bytes(table: pl.DataFrame) -> bytes:
     """The table as a Parquet file's bytes."""
     buffer = io.BytesIO()
     table.write_parquet(buffer)

@@ -17,14 +17,14 @@ from proxcgal.evaluation.metrics import write_json
 
 MANIFEST, TRIALS, SUMMARY = "campaign.json", "trials", "summary.json"
 
-Cell = str | int | float | bool | None
+Value = str | int | float | bool | None
 Series = list[float | None]  # a number over time
-Row = dict[str, Cell | Series]
+Row = dict[str, Value | Series]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """What became of one trial."""
+    """Result of one trial."""
 
     key: str
     row: Row | None = None  # its numbers; None where it failed
@@ -32,7 +32,7 @@ class Outcome:
     wall_s: float = 0.0  # [s] what it took; says nothing of the trial itself
 
 
-class Store(Closing):
+class CampaignStore(Closing):
     """The trials of one campaign that came to an end, one file each.
 
     A file is written beside, brought to the disk and moved into place before `put` returns: what
@@ -66,7 +66,7 @@ class Store(Closing):
             self._held = opened.pop_all()
 
     def _open(self, folder: Path, description: Mapping[str, Any]) -> None:
-        """Nobody else can come between what is found there and what is made of it."""
+        """Checks and prepares the folder, which is locked."""
         _refuse_other(folder, description)
         self._trials.mkdir(exist_ok=True)
         for half in self._trials.glob(".*"):  # of a process that was killed
@@ -75,7 +75,7 @@ class Store(Closing):
             write_json(folder / MANIFEST, description)
 
     def close(self) -> None:
-        """Lets other processes in, the first time; a killed process does so too."""
+        """Unlocks the folder, the first time; the end of the process does so too."""
         self._held.close()
 
     def put(self, outcome: Outcome) -> None:
@@ -91,8 +91,8 @@ class Store(Closing):
         return found
 
 
-def read_description(folder: Path) -> dict[str, Any] | None:
-    """What the campaign in a folder was described by; None where there is none.
+def _read_manifest(folder: Path) -> dict[str, Any] | None:
+    """Description of the campaign in a folder; None where there is none.
 
     Raises:
         ConfigError: there is something that cannot be read.
@@ -110,7 +110,7 @@ def read_description(folder: Path) -> dict[str, Any] | None:
 
 
 def _refuse_other(folder: Path, description: Mapping[str, Any]) -> None:
-    there = read_description(folder)
+    there = _read_manifest(folder)
     here = json.loads(json.dumps(description))
     if there is None and (folder / SUMMARY).exists():
         raise ConfigError(

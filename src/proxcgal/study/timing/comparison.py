@@ -11,22 +11,17 @@ from proxcgal.evaluation.metrics import aligned
 CYCLE_US = 66_700.0  # [us] of the sensors; the paper's worst case stays within it
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Comparison:
-    """Median times of both methods on the same input."""
+    """Both methods' cells on the same input, as `summary.json` has them."""
 
-    robot: str
-    vertices: int
-    cloud: str
-    points: int
-    algorithm: int
-    paper_us: float
-    fast_us: float
+    paper: Mapping[str, Any]
+    fast: Mapping[str, Any]
 
     @property
     def ratio(self) -> float:
         """How many times as fast the accelerated method is."""
-        return self.paper_us / self.fast_us
+        return float(self.paper["median_us"] / self.fast["median_us"])
 
 
 def compare(cells: Iterable[Mapping[str, Any]]) -> list[Comparison]:
@@ -34,14 +29,13 @@ def compare(cells: Iterable[Mapping[str, Any]]) -> list[Comparison]:
 
     A cell without its counterpart is left out.
     """
-    same = ("robot", "vertices", "cloud", "points", "algorithm")
-    medians: dict[tuple[Any, ...], dict[str, float]] = {}
+    by_input: dict[tuple[Any, ...], dict[str, Mapping[str, Any]]] = {}
     for cell in cells:
-        key = tuple(cell[name] for name in same)
-        medians.setdefault(key, {})[cell["method"]] = cell["median_us"]
+        key = tuple(cell[name] for name in ("robot", "vertices", "cloud", "points", "algorithm"))
+        by_input.setdefault(key, {})[cell["method"]] = cell
     return [
-        Comparison(**dict(zip(same, key, strict=True)), paper_us=of["paper"], fast_us=of["fast"])
-        for key, of in medians.items()
+        Comparison(of["paper"], of["fast"])
+        for of in by_input.values()
         if of.keys() >= {"paper", "fast"}
     ]
 
@@ -53,19 +47,20 @@ def sweep_table(comparisons: Sequence[Comparison]) -> str:
         ("", "", "", "", "", "[us]", "[us]", ""),
     ]
     for c in comparisons:
-        numbers = (f"{c.vertices}", f"{c.points}", f"{c.algorithm}")
-        times = (f"{c.paper_us:.0f}", f"{c.fast_us:.1f}", f"{c.ratio:.1f}")
-        rows.append((c.robot, c.cloud, *numbers, *times))
+        texts = (c.paper[key] for key in ("robot", "cloud"))
+        numbers = (str(c.paper[key]) for key in ("vertices", "points", "algorithm"))
+        times = (f"{c.paper['median_us']:.0f}", f"{c.fast['median_us']:.1f}", f"{c.ratio:.1f}")
+        rows.append((*texts, *numbers, *times))
     return aligned(rows, left=2, heads=2)
 
 
 def cycle_verdict(comparisons: Sequence[Comparison]) -> str:
-    """Where both forms, both algorithms on one scan, miss the sensors' cycle, in words."""
+    """Where both forms, both algorithms on one scan, miss the sensors' cycle, as a sentence."""
     cells: dict[tuple[str, int, str], tuple[float, float]] = {}
     for c in comparisons:
-        place = (c.robot, c.vertices, c.cloud)
+        place = (c.paper["robot"], c.paper["vertices"], c.paper["cloud"])
         paper, fast = cells.get(place, (0.0, 0.0))
-        cells[place] = (paper + c.paper_us, fast + c.fast_us)
+        cells[place] = (paper + c.paper["median_us"], fast + c.fast["median_us"])
     missed = [
         f"{robot}, {vertices} vertices, {cloud} cloud: {paper / 1000.0:.0f} ms"
         for (robot, vertices, cloud), (paper, _) in cells.items()
