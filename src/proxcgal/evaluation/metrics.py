@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from proxcgal.core.errors import ConfigError
 
 if TYPE_CHECKING:
-    from proxcgal.trial.trial import TrialLog
+    from proxcgal.evaluation.trial_log import TrialLog
 
 Summary = dict[str, Any]
 

@@ -18,15 +18,12 @@ from proxcgal.models import Robot
 from proxcgal.scenario.loading import Scenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.scene.dragging import DraggedSolids, LiveScene
-from proxcgal.sim.faults import FaultInjector
-from proxcgal.sim.loop import run_ticks
+from proxcgal.sim.clouds import Clouds
 from proxcgal.sim.moment import Moment
-from proxcgal.sim.mount_faults import require_mounts
-from proxcgal.sim.source import SimulatedSource
 from proxcgal.sim.tick import TickInput, TickResult
-from proxcgal.sim.world import World
+from proxcgal.trial.assembly import assemble
 from proxcgal.trial.walkthrough.grip import HAND
-from proxcgal.trial.walkthrough.guided import GuidedScenario, GuidedSource
+from proxcgal.trial.walkthrough.guided import GuidedSource
 
 _ENDLESS = 1e7  # [s]
 
@@ -74,20 +71,15 @@ class LiveTrial:
             drawn=drawn,
             q0=setup.q0 if q is None else np.array(q),
         )
-        known = setup.known_cloud() if setup.uses_known_points(controller) else None
-        self.ctrl = setup.make_controller(controller, 0 if known is None else len(known))
-        names = [mount.name for mount in setup.skin.mounts]
-        self._faults = FaultInjector(scenario.faults, names, scenario.seed)
-        world = World(setup.robot, scene) if known is None else None
-        make = GuidedSource if isinstance(scenario, GuidedScenario) else SimulatedSource
-        self._source = source = make(setup, world, scenario.seed)
-        if world is not None and scenario.skin.check_mounts and q is None:
-            require_mounts(setup, source)
-        if isinstance(source, GuidedSource) and q is not None:
-            source.take_over()  # its path began elsewhere
+        self._run = run = assemble(setup, controller)
+        self.ctrl, self._source = run.ctrl, run.source
+        if q is None:
+            run.require_mounts()
+        elif isinstance(run.source, GuidedSource):
+            run.source.take_over()  # its path began elsewhere
         self._truth = GroundTruth(setup.robot, measured)
         self._count = 0
-        self._ticks = run_ticks(source, self.ctrl, self._spoiled, known)
+        self._ticks = run.ticks(self._spoiled)
         self._last: tuple[TickInput, TickResult] | None = None
 
     @property
@@ -152,9 +144,10 @@ class LiveTrial:
         now = (self._count - 1) * self.period
         true = self._truth.nearest(self._source.q, now).distance
         q = inputs.q if np.isfinite(inputs.q).all() else self._source.q
+        held = np.isin(self.ctrl.cloud_origins()[:, 0], list(self.off))
         return Moment.of(
-            self.setup, inputs, result, self.ctrl, now, q=q, true=true,
-            since=self.since, off=self.off, **self._hand(),
+            self.setup, inputs, result, Clouds.of(self.ctrl), now, q=q, true=true,
+            since=self.since, held=held, **self._hand(),
         )  # fmt: skip
 
     def _hand(self) -> dict[str, Any]:
@@ -170,7 +163,7 @@ class LiveTrial:
 
     def _spoiled(self, inputs: TickInput) -> TickInput:
         """What the controller gets: the scenario's faults, and nothing of silent sensors."""
-        inputs = self._faults(inputs)
+        inputs = self._run.faults(inputs)
         if not self.off:
             return inputs
         return replace(inputs, scans=tuple(s for s in inputs.scans if s.sensor not in self.off))
