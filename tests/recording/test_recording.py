@@ -175,7 +175,7 @@ def test_mcaps_own_reader_reads_every_message_as_json(tmp_path: Path) -> None:
 
 def test_arrow_points_from_the_robot_to_the_obstacle() -> None:
     tail, tip = np.array([0.1, 0.2, 0.3]), np.array([0.4, -0.2, 0.3])
-    content = json.loads(foxglove.pair_arrow(1.5, tail.tolist(), tip.tolist()))
+    content = json.loads(foxglove.arrow_update(1.5, tail.tolist(), tip.tolist()))
     (arrow,) = content["entities"][0]["arrows"]
     x, y, z, w = (arrow["pose"]["orientation"][name] for name in "xyzw")
     along = np.array([1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)])

@@ -118,7 +118,9 @@ def frame_transforms(time: float, names: Sequence[str], poses_W: Array) -> bytes
     return _json(transforms=transforms)
 
 
-def pair_arrow(time: float, tail_W: Sequence[float] | None, tip_W: Sequence[float] | None) -> bytes:
+def arrow_update(
+    time: float, tail_W: Sequence[float] | None, tip_W: Sequence[float] | None
+) -> bytes:
     """foxglove.SceneUpdate: the closest pair as an arrow; without one, the last arrow goes."""
     if tail_W is None or tip_W is None:
         gone = {"timestamp": _time(time), "type": 0, "id": "closest_pair"}

@@ -116,7 +116,7 @@ class Recorder(McapFile):
                 self._add(KEPT, time, foxglove.point_cloud(time, clouds.kept_W))
                 self._add(REMOVED, time, foxglove.point_cloud(time, clouds.removed_W))
                 self._add("/links", time, foxglove.frame_transforms(time, links, poses_W))
-                self._add("/scene", time, foxglove.pair_arrow(time, *arrow))
+                self._add("/scene", time, foxglove.arrow_update(time, *arrow))
 
     def show_scene(self, time: float, scene: Scene, elapsed: float) -> None:
         """Writes where the scene's solids are at `elapsed` [s], for Foxglove."""

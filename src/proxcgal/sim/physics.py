@@ -45,7 +45,7 @@ class OperatorShape:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GroundTruth:
+class GuardTruth:
     """What holds at one moment."""
 
     tcp_speed: float  #: [m/s]
@@ -101,9 +101,9 @@ class Physics:
         self._timing = robot.brakes
         self._period = period
         self._off_for = np.inf  # [s] since the torque was cut
-        self._wish = np.array(q0, np.float64)  # where the drives want to be
-        self._command = np.zeros_like(self._wish)
-        self._inertia = np.zeros_like(self._wish)
+        self._target = np.array(q0, np.float64)  # where the drives want to be
+        self._command = np.zeros_like(self._target)
+        self._inertia = np.zeros_like(self._target)
         self._data.qpos[:] = q0
         self._close_brakes()
         mujoco.mj_forward(self._model, self._data)
@@ -147,7 +147,7 @@ class Physics:
         twist = self.tool_twist()
         return twist[:3] + np.cross(twist[3:], self.tool_R @ self._human_offset)
 
-    def truth(self, pairs: tuple[str, ...], ends: Sequence[tuple[str, Array]]) -> GroundTruth:
+    def truth(self, pairs: tuple[str, ...], ends: Sequence[tuple[str, Array]]) -> GuardTruth:
         """What the guard should find, by MuJoCo's own kinematics and distances: an oracle.
 
         Args:
@@ -178,7 +178,7 @@ class Physics:
             way[2] += min(max(point[2] - human_W[2], -half), half)
             fastest = max(fastest, float(way @ (jacobian @ data.qvel)) / math.sqrt(way @ way))
         mujoco.mj_jacSite(model, data, jacobian, None, self._tool)
-        return GroundTruth(
+        return GuardTruth(
             tcp_speed=float(np.linalg.norm(jacobian @ data.qvel)), distance=float(distance),
             velocity=fastest,
         )  # fmt: skip
@@ -199,7 +199,7 @@ class Physics:
             if self._off_for > 0.0:  # brakes open, the drives take over where the arm stands
                 self._off_for = 0.0
                 model.dof_frictionloss[:] = 0.0
-                self._wish[:] = data.qpos
+                self._target[:] = data.qpos
                 self._command[:] = 0.0
             self._drive(command)
         else:
@@ -220,11 +220,11 @@ class Physics:
     def _drive(self, command: Array) -> None:
         """Computed torque: a = ramp of the command + 2 w (qd error) + w^2 (q error)."""
         model, data, drives = self._model, self._data, self._drives
-        self._wish += self._period * command
+        self._target += self._period * command
         stiffness = drives.frequency**2
         wanted = (command - self._command) / self._period
         wanted += 2.0 * drives.frequency * (command - data.qvel)
-        wanted += stiffness * (self._wish - data.qpos)
+        wanted += stiffness * (self._target - data.qpos)
         self._command[:] = command
         mujoco.mj_mulM(model, data, self._inertia, wanted)
         data.qfrc_applied[:] = drives.model_mass * self._inertia

@@ -6,7 +6,7 @@ from proxcgal.scenario.setup import Setup
 from proxcgal.scenario.walkthrough import GuidedScenario
 from proxcgal.sim.assembly import Assembly
 from proxcgal.sim.source import SimulatedSource
-from proxcgal.trial.walkthrough.guided import GuidedSource
+from proxcgal.trial.walkthrough.guided_source import GuidedSource
 
 
 def assemble(setup: Setup, controller: str, seed: int | None = None) -> Assembly:

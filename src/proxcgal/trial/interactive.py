@@ -22,8 +22,8 @@ from proxcgal.sim.clouds import Clouds
 from proxcgal.sim.moment import Moment
 from proxcgal.sim.tick import TickInput, TickResult
 from proxcgal.trial.assembly import assemble
-from proxcgal.trial.walkthrough.grip import HAND
-from proxcgal.trial.walkthrough.guided import GuidedSource
+from proxcgal.trial.walkthrough.guided_source import GuidedSource
+from proxcgal.trial.walkthrough.interactive_hand import HAND
 
 _ENDLESS = 1e7  # [s]
 
@@ -134,8 +134,8 @@ class LiveTrial:
     def release(self) -> None:
         """Lets go of all that is held."""
         self.hands.release()
-        if isinstance(self._source, GuidedSource) and self._source.grip is not None:
-            self._source.grip.let_go()
+        if isinstance(self._source, GuidedSource) and self._source.user_hand is not None:
+            self._source.user_hand.let_go()
 
     def moment(self) -> Moment:
         """What there is to see now, the true distance with it."""
@@ -154,8 +154,8 @@ class LiveTrial:
         """The hand at the tool of a guided arm: where it is, and whether somebody holds it."""
         if not isinstance(self._source, GuidedSource):
             return {}
-        grip = self._source.grip
-        pose = None if grip is None else grip.pose
+        hand = self._source.user_hand
+        pose = None if hand is None else hand.pose
         return {"hand_W": self._tool() if pose is None else pose, "gripped": pose is not None}
 
     def _tool(self) -> Array:

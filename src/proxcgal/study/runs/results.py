@@ -99,7 +99,7 @@ def _summary(scenario: Scenario, logs: Sequence[TrialLog]) -> Summary:
     """What `summary.json` says, with what belongs to the kind of scene alone."""
     from proxcgal.evaluation.phases import mean_distances
     from proxcgal.scenario.loading import HriScenario
-    from proxcgal.trial.walkthrough.guided import GuidedScenario, off_paths
+    from proxcgal.trial.walkthrough.guided_source import GuidedScenario, off_paths
 
     summary = static_summary(logs)
     if isinstance(scenario, HriScenario):

@@ -15,8 +15,8 @@ from proxcgal.core.transforms import pose
 from proxcgal.core.typing import Array
 from proxcgal.scenario.walkthrough import WalkScenario
 from proxcgal.sim.moment import Posed
-from proxcgal.trial.walkthrough.cell import Cell
-from proxcgal.trial.walkthrough.grip import HAND, Grip
+from proxcgal.trial.walkthrough.guarded_arm import GuardedArm
+from proxcgal.trial.walkthrough.interactive_hand import HAND, InteractiveHand
 from proxcgal.trial.walkthrough.setup import PERIOD, WalkSetup
 
 CYCLES = 10  #: of the guard, in one step
@@ -82,8 +82,8 @@ class WalkTrial:
             ModelError: the robot's description.
         """
         self.setup = setup or WalkSetup.of(scenario)
-        self._cell = Cell(self.setup)
-        self._grip = Grip(scenario.hand, PERIOD)
+        self._arm = GuardedArm(self.setup)
+        self._grip = InteractiveHand(scenario.hand, PERIOD)
         self._nothing = np.zeros(6)
         self._cycle = 1
         self._pressed = False
@@ -91,8 +91,8 @@ class WalkTrial:
         self._force = 0.0
         self._worst = _NOTHING
         self.cpu_us = 0.0  #: of the thread, a cycle, in the last step
-        self._out = self._cell.watch(0.0, False)
-        self._cell.move(self._nothing, False)
+        self._out = self._arm.watch(0.0, False)
+        self._arm.move(self._nothing, False)
 
     @property
     def period(self) -> float:
@@ -138,7 +138,7 @@ class WalkTrial:
 
     def moment(self) -> WalkMoment:
         """What there is to see now; the worst of the cycles since it was asked last."""
-        out, physics, robot = self._out, self._cell.physics, self.setup.robot
+        out, physics, robot = self._out, self._arm.physics, self.setup.robot
         worst, self._worst = self._worst, _NOTHING
         if worst is _NOTHING:
             worst = _NOTHING.with_cycle(out)
@@ -157,14 +157,14 @@ class WalkTrial:
 
     def operator_W(self) -> Array:  # noqa: N802  a frame's suffix
         """(4, 4) of the operator's capsule, which rides on the tool and stands upright."""
-        physics, offset = self._cell.physics, self.setup.scenario.guard.human.offset
+        physics, offset = self._arm.physics, self.setup.scenario.guard.human.offset
         return pose(tuple(physics.tool_W + physics.tool_R @ np.array(offset)))
 
     def _one(self) -> None:
-        physics, grip = self._cell.physics, self._grip
+        physics, grip = self._arm.physics, self._grip
         pressed, self._pressed = self._pressed, False
         was_on = self._out.torque
-        self._out = out = self._cell.watch(self._cycle * PERIOD, pressed)
+        self._out = out = self._arm.watch(self._cycle * PERIOD, pressed)
         self._worst = self._worst.with_cycle(out)
         if pressed:
             self._refused = self._reason() if out.reset_refused else ""
@@ -176,7 +176,7 @@ class WalkTrial:
         if out.torque and not was_on:
             self._refused = ""
         self._force = float(np.linalg.norm(force[:3]))
-        self._cell.move(force, grip.holds)
+        self._arm.move(force, grip.holds)
         self._cycle += 1
 
     def _reason(self) -> str:
@@ -201,5 +201,5 @@ class WalkTrial:
 
     def _tool(self) -> Array:
         T_WT = np.eye(4)
-        T_WT[:3, :3], T_WT[:3, 3] = self._cell.physics.tool_R, self._cell.physics.tool_W
+        T_WT[:3, :3], T_WT[:3, 3] = self._arm.physics.tool_R, self._arm.physics.tool_W
         return T_WT

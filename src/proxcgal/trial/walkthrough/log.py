@@ -10,7 +10,7 @@ import numpy as np
 from proxcgal import _core
 from proxcgal.core.typing import Array, Bools
 from proxcgal.scenario.walkthrough import Guard
-from proxcgal.sim.physics import GroundTruth, Physics
+from proxcgal.sim.physics import GuardTruth, Physics
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,7 +53,7 @@ class WalkLog:
     trips: list[Trip] = field(default_factory=list)
     overrun: bool = False
     cycles: int = 0
-    left_m: float | None = None  #: of the tool from where the wished path ends; None after a trip
+    left_m: float | None = None  #: of the tool from where the intended path ends; None after a trip
 
     @classmethod
     def empty(cls, cycles: int, joints: int, period: float, keys: Guard) -> WalkLog:
@@ -72,7 +72,7 @@ class WalkLog:
         physics: Physics,
         out: _core.GuardOutput,
         force: Array | None,
-        truth: GroundTruth | None,
+        truth: GuardTruth | None,
         bounds: tuple[Array, Array],
     ) -> None:
         """One cycle more; `bounds` are qd_UB and qdd_UB, for what is true."""
@@ -164,7 +164,7 @@ class WalkLog:
         """Something is truly violated and nothing trips."""
         return not self.trips and bool(self.truly_violated().any())
 
-    def told_trips(self) -> list[dict[str, Any]]:
+    def trip_records(self) -> list[dict[str, Any]]:
         """Each trip's time, function, value and limit."""
         return [
             {"time_s": t.time_s, "function": t.function, "value": t.value, "limit": t.limit}
@@ -175,7 +175,7 @@ class WalkLog:
         """What experiments report."""
         stop = self.stop_time_s()
         return {
-            "trips": self.told_trips(),
+            "trips": self.trip_records(),
             "peak_after_cut_mps": self.peak_after_cut(),
             "stop_time_s": stop if stop is None or np.isfinite(stop) else None,
             "stop_distance_m": self.stop_distance_m(),

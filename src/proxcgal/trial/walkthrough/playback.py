@@ -12,7 +12,7 @@ from proxcgal.core.typing import Array
 from proxcgal.models import Robot
 from proxcgal.trial.walkthrough.log import WalkLog
 from proxcgal.trial.walkthrough.setup import PERIOD, WalkSetup
-from proxcgal.trial.walkthrough.taught import TaughtPath, needed_scale, tool_positions
+from proxcgal.trial.walkthrough.taught_path import TaughtPath, needed_scale, tool_positions
 
 _RESET_AT, _BEGIN = 0.01, 0.10  # [s] the button, the first motion
 _SETTLE = 0.4  # [s] at the start and at the end of the path
@@ -21,7 +21,7 @@ _PULL = 5.0  # [1/s] by which what is left to the path's first pose goes
 
 
 @dataclass(frozen=True, eq=False)
-class Played:
+class Playback:
     """One playback."""
 
     log: WalkLog
@@ -30,7 +30,7 @@ class Played:
     time_s: float  #: of the path alone
 
 
-def play(setup: WalkSetup, path: TaughtPath, q: Array | None = None) -> Played:
+def play(setup: WalkSetup, path: TaughtPath, q: Array | None = None) -> Playback:
     """Runs a taught path from wherever the arm stands; the guard is active throughout.
 
     Args:
@@ -80,7 +80,7 @@ def play(setup: WalkSetup, path: TaughtPath, q: Array | None = None) -> Played:
         [np.interp(path_time, path.raw_time, column) for column in path.raw_tool_W.T], axis=1
     )
     error = np.linalg.norm(played - taught, axis=1)[inside]
-    return Played(log, scale, error, scale * path.duration)
+    return Playback(log, scale, error, scale * path.duration)
 
 
 def check_start(robot: Robot, q: Array, path: TaughtPath, tolerance: float) -> None:

@@ -1,4 +1,4 @@
-"""A hand at the tool that somebody moves while the arm runs; it pulls as every hand here does."""
+"""A hand at the tool that a user moves while the arm runs; it pulls with the operator's impedance."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from proxcgal.core.typing import Array
 from proxcgal.scenario.walkthrough import Hand as HandKeys
-from proxcgal.trial.walkthrough.hand import Pull
+from proxcgal.trial.walkthrough.operator_hand import HandImpedance
 
 HAND = "hand at the tool"  #: its name, beside those of solids
 SPEED = 2.0  #: [m/s] at most: above what a guard lets an arm do
@@ -14,14 +14,14 @@ ACCELERATION = 10.0  #: [m/s^2] at most: a hand that is dragged by leaps pulls w
 _STIFFNESS = 10.0  # [rad/s] by which it goes where it is wanted, critically damped
 
 
-class Grip:
-    """Holds the tool once it is told where to go, until it lets go or the arm stops."""
+class InteractiveHand:
+    """Holds the tool from its first `move` until it lets go or the arm stops."""
 
     def __init__(self, keys: HandKeys, period: float) -> None:
         """Args: `keys` of its spring and damper; one step takes `period` [s]."""
         self._keys = keys
         self._period = period
-        self._pull = Pull(keys, period)
+        self._pull = HandImpedance(keys, period)
         self._pose: Array | None = None
         self._wanted = np.eye(4)
         self._twist = np.zeros(6)
@@ -45,7 +45,7 @@ class Grip:
         """
         if self._pose is None:
             self._pose = np.array(tool)
-            self._pull = Pull(self._keys, self._period)
+            self._pull = HandImpedance(self._keys, self._period)
             self._twist[:] = 0.0
         self._wanted = np.array(wanted)
 

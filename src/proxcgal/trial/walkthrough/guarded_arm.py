@@ -9,7 +9,7 @@ from proxcgal.core.typing import Array
 from proxcgal.trial.walkthrough.setup import WalkSetup
 
 
-class Cell:
+class GuardedArm:
     """One arm under its guard. A cycle is `watch`, then `move`."""
 
     def __init__(self, setup: WalkSetup) -> None:
