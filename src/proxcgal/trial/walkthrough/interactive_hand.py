@@ -1,4 +1,4 @@
-"""A hand at the tool that a user moves while the arm runs; it pulls with the operator's impedance."""
+"""A hand at the tool that a user moves while the arm runs; it pulls as the operator's does."""
 
 from __future__ import annotations
 

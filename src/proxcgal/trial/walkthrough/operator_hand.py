@@ -79,7 +79,7 @@ class HandImpedance:
 
 
 class OperatorHand:
-    """Pulls the tool along an intended path; lets go after its reaction time once the arm has stopped."""
+    """Pulls the tool along an intended path; lets go of an arm that it feels has stopped."""
 
     def __init__(
         self, keys: HandKeys, path: IntendedPath, start: Array, period: float, seed: int

@@ -21,7 +21,7 @@ _PULL = 5.0  # [1/s] by which what is left to the path's first pose goes
 
 
 @dataclass(frozen=True, eq=False)
-class Playback:
+class PlaybackResult:
     """One playback."""
 
     log: WalkLog
@@ -30,7 +30,7 @@ class Playback:
     time_s: float  #: of the path alone
 
 
-def play(setup: WalkSetup, path: TaughtPath, q: Array | None = None) -> Playback:
+def play(setup: WalkSetup, path: TaughtPath, q: Array | None = None) -> PlaybackResult:
     """Runs a taught path from wherever the arm stands; the guard is active throughout.
 
     Args:
@@ -80,7 +80,7 @@ def play(setup: WalkSetup, path: TaughtPath, q: Array | None = None) -> Playback
         [np.interp(path_time, path.raw_time, column) for column in path.raw_tool_W.T], axis=1
     )
     error = np.linalg.norm(played - taught, axis=1)[inside]
-    return Playback(log, scale, error, scale * path.duration)
+    return PlaybackResult(log, scale, error, scale * path.duration)
 
 
 def check_start(robot: Robot, q: Array, path: TaughtPath, tolerance: float) -> None:

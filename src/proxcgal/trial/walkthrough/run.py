@@ -11,7 +11,7 @@ import numpy as np
 
 from proxcgal.core.errors import RecordingError
 from proxcgal.trial.walkthrough.log import WalkLog
-from proxcgal.trial.walkthrough.playback import Playback, play
+from proxcgal.trial.walkthrough.playback import PlaybackResult, play
 from proxcgal.trial.walkthrough.pose_recording import PoseRecorder, read_poses
 from proxcgal.trial.walkthrough.setup import PERIOD, WalkSetup
 from proxcgal.trial.walkthrough.stopping_performance import (
@@ -30,7 +30,7 @@ class WalkResult:
 
     log: WalkLog
     path: TaughtPath | None = None  #: where it was taught to the end
-    played: Playback | None = None
+    played: PlaybackResult | None = None
     slow: WalkLog | None = None  #: the same path taught under the hand-guiding rules
     stops: list[StoppingPerformance] = field(default_factory=list)
     stops_note: str | None = None  #: why those in the worst posture were left out
