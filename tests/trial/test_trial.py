@@ -18,14 +18,15 @@ from PIL import Image
 import proxcgal as px
 from proxcgal.evaluation.trial_log import final_ticks
 from proxcgal.recording.reader import Recorder, Recording, read_recording
-from proxcgal.recording.render import animate, recorded_moments
+from proxcgal.recording.render import draw, recorded_moments, write_gif
 from proxcgal.recording.replay import Replay, recorded_log
 from proxcgal.scenario.keys import INPUT_FAULTS, Fault
 from proxcgal.scenario.loading import load_scenario
-from proxcgal.scenario.setup import Setup
+from proxcgal.scenario.setup import Setup, make_robot
 from proxcgal.sim.faults import FaultInjector
 from proxcgal.sim.range_sensor import NO_TARGET, VALID
 from proxcgal.sim.tick import TickInput
+from proxcgal.sim.world import World
 from proxcgal.study.campaign_picture import _draw
 from proxcgal.study.runs.results import warn_of_stopped
 from proxcgal.study.trials import simulate
@@ -441,7 +442,14 @@ def test_the_ticks_with_scans_bring_their_clouds_too(ur10e: px.Robot, tmp_path: 
 
 
 def test_a_run_becomes_a_small_moving_picture(recording: Recording, tmp_path: Path) -> None:
-    path = animate(recording, tmp_path / "a.gif", fps=2.0, size=(240, 180))
+    path, scenario = tmp_path / "a.gif", recording.settings.scenario
+    world = World(make_robot(scenario), scenario.drawn())
+    moments = recorded_moments(recording, np.arange(0.0, 3.0, 0.5).tolist())
+    try:
+        frames = [Image.fromarray(draw(world, moment, (240, 180))) for moment in moments]
+    finally:
+        world.close()
+    write_gif(frames, path, 2.0)
     with Image.open(path) as image:
         assert image.n_frames == 6  # type: ignore[attr-defined]
         assert image.size == (240, 180)

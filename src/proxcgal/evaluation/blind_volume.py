@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,10 +12,8 @@ from proxcgal.core.errors import ConfigError
 from proxcgal.core.transforms import inverse, placed
 from proxcgal.core.typing import Array
 from proxcgal.evaluation.visibility import Visibility
-
-if TYPE_CHECKING:
-    from proxcgal.models import Robot
-    from proxcgal.scenario.setup import Setup
+from proxcgal.models import Robot
+from proxcgal.scenario.setup import Setup
 
 REACH_M = 0.5  #: [m] from the arm's surface: what is farther is not counted
 _SPACING_M = 0.05  # [m] of the points that stand for the volume

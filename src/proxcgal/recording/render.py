@@ -11,11 +11,9 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from proxcgal.core.errors import ConfigError
-from proxcgal.core.transforms import inverse, placed
 from proxcgal.core.typing import Array
 from proxcgal.recording.reader import Recording
 from proxcgal.recording.replay import Replay
-from proxcgal.scenario.setup import Setup
 from proxcgal.sim.clouds import Clouds
 from proxcgal.sim.tick import Tick
 from proxcgal.sim.world import Arrow, Camera, Color, Spheres, World
@@ -27,7 +25,6 @@ _RAW: Color = (0.25, 0.45, 0.95, 0.55)
 _PAIR: Color = (0.05, 0.60, 0.20, 1.0)
 _AXES: tuple[Color, ...] = ((0.9, 0.1, 0.1, 1.0), (0.1, 0.7, 0.1, 1.0), (0.1, 0.2, 0.9, 1.0))
 _GIF_COLORS = 128
-_ASIDE, _DOWN = -1.05, -0.38  # [rad] of the view against the obstacle's direction
 
 
 @dataclass(frozen=True)
@@ -87,20 +84,6 @@ def _with_clouds(
             return
 
 
-def viewpoint(setup: Setup) -> Camera:
-    """From beside the arm, towards the face that the nearest obstacle turns to it."""
-    base_W = np.array([0.0, 0.0, 0.6])
-    tool_W = np.array(setup.robot.tool_pose(setup.q0))[:3, 3]
-    faces = [
-        placed(T_WO, solid.nearest(placed(inverse(T_WO), base_W)))
-        for solid, T_WO in zip(setup.scene.solids, setup.scene.poses(0.0), strict=True)
-    ]
-    face_W = min(faces, key=lambda point: float(np.linalg.norm(point - base_W)), default=tool_W)
-    across = np.arctan2(face_W[1], face_W[0])
-    middle = (base_W + tool_W + face_W) / 3.0
-    return Camera(tuple(middle.tolist()), 2.4, float(across) + _ASIDE, _DOWN)
-
-
 def draw(
     world: World,
     snapshot: RecordedMoment,
@@ -110,45 +93,6 @@ def draw(
     """(height, width, 3) of one snapshot. Raises: SimulationError where nothing can draw."""
     world.place(snapshot.q, snapshot.elapsed)
     return world.picture(list(_marks(snapshot)), size, camera)
-
-
-def animate(
-    recording: Recording,
-    path: str | Path,
-    fps: float = 8.0,
-    *,
-    size: tuple[int, int] = (480, 360),
-    camera: Camera | None = None,
-    seconds: float | None = None,
-) -> Path:
-    """Writes the run as a GIF that plays in real time.
-
-    Args:
-        recording: of a run.
-        path: where to.
-        fps: pictures a second.
-        size: width and height in pixels.
-        camera: where to look from.
-        seconds: of the run; left out: all.
-
-    Raises:
-        ConfigError: the file cannot be written.
-        SimulationError: nothing can draw here.
-    """
-    end = recording.ticks[-1].inputs.time if recording.ticks else 0.0
-    times = np.arange(0.0, min(end, seconds or end) + 1e-9, 1.0 / fps)
-    setup = Setup.of(recording.settings.scenario)
-    scenario = setup.scenario
-    world = World(setup.robot, scenario.drawn(), scenario.floor, setup.scene.names)
-    try:
-        frames = [
-            Image.fromarray(draw(world, snapshot, size, camera or viewpoint(setup)))
-            for snapshot in recorded_moments(recording, times.tolist())
-        ]
-    finally:
-        world.close()
-    write_gif(frames, Path(path), fps)
-    return Path(path)
 
 
 def write_gif(frames: Sequence[Image.Image], path: Path, fps: float) -> None:

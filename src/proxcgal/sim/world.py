@@ -15,7 +15,7 @@ import os
 import sys
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -23,7 +23,9 @@ from numpy.typing import NDArray
 
 from proxcgal.core.errors import SimulationError
 from proxcgal.core.typing import Array, Bools
+from proxcgal.models.robots import Robot
 from proxcgal.models.surfaces import Surfaces
+from proxcgal.scene.obstacles import Scene
 from proxcgal.scene.solids import Box, Capsule, Cylinder, Solid, Sphere
 
 
@@ -43,10 +45,6 @@ if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get(
 
 _TOO_LATE = "mujoco" in sys.modules
 import mujoco  # noqa: E402
-
-if TYPE_CHECKING:
-    from proxcgal.models.robots import Robot
-    from proxcgal.scene.obstacles import Scene
 
 Color = tuple[float, float, float, float]
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from proxcgal.core.typing import Array
+from proxcgal.core.typing import Array, Bools
 from proxcgal.evaluation.coverage import coverage_of, sightings
 from proxcgal.evaluation.ground_truth import NOT_ASKED, GroundTruth
 from proxcgal.evaluation.sparse_ground_truth import sparse_ground_truth
@@ -22,7 +22,7 @@ from proxcgal.recording.writer import Recorder
 from proxcgal.scenario.loading import CONTROLLERS, Scenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.sim.assembly import Assembly
-from proxcgal.sim.tick import Tick, TickTruth
+from proxcgal.sim.tick import Tick, TickResult, TickTruth
 from proxcgal.trial.assembly import assemble
 
 __all__ = ["CONTROLLERS", "TrialLog", "first_difference", "recompute", "run_trial"]
@@ -64,104 +64,95 @@ def run_trial(
     """
     begin = clock.perf_counter()
     run = assemble(Setup.of(scenario, robot), controller, seed)
+    setup = run.setup
     run.require_mounts()
     sparse = (sparse_truth or without_truth) and recorder is None
-    loop = _Loop(run, recorder, on_progress, truth_at_every_tick=not sparse)
-    loop.run()
-    ending = loop.conclude()
+    truth = None if sparse else GroundTruth(setup.robot, setup.measured)
+    ticks, postures, ending = _simulate(run, truth, recorder, on_progress or (lambda _: None))
+    # Not the ticks' own time, which a fault may make jump.
+    elapsed = np.arange(len(ticks), dtype=np.float64) * run.ctrl.config.period
+    ending = _conclude(run, ending, ticks[-1].result, postures[-1], float(elapsed[-1]))
     if sparse and not without_truth:
-        loop.ask_sparse_truth(truth_hz or 0.0)
+        wanted = final_ticks(elapsed) | sampled_ticks(elapsed, truth_hz or 0.0)
+        ticks = _with_truth(ticks, elapsed, postures, setup, wanted)
     log = TrialLog.of(
-        loop.ticks, run.setup.robot, scenario=scenario.name, controller=controller, seed=run.seed,
-        wall_s=clock.perf_counter() - begin, elapsed=loop.elapsed,
+        ticks, setup.robot, scenario=scenario.name, controller=controller, seed=run.seed,
+        wall_s=clock.perf_counter() - begin, elapsed=elapsed,
         recording_failure=recorder.failure if recorder else None, ending=ending,
     )  # fmt: skip
-    return _with_coverage(log, run.setup, np.array(loop.postures)) if coverage else log
+    return _with_coverage(log, setup, postures) if coverage else log
 
 
-class _Loop:
-    """Tick after tick of one run, recorded on the way."""
+def _simulate(
+    run: Assembly, truth: GroundTruth | None, recorder: Recorder | None, on_progress: Progress
+) -> tuple[list[Tick], Array, Ending | None]:
+    """Tick after tick until the scenario's end, or the goal's; recorded on the way.
 
-    def __init__(
-        self,
-        run: Assembly,
-        recorder: Recorder | None,
-        on_progress: Progress | None,
-        *,
-        truth_at_every_tick: bool,
-    ) -> None:
-        setup = run.setup
-        self._run, self._on_progress = run, on_progress
-        self._truth = GroundTruth(setup.robot, setup.measured) if truth_at_every_tick else None
-        self._recorder = None if recorder is None else TrialRecorder(recorder, run)
-        finish = setup.scenario.ends()
-        self._watch = None if finish is None else GoalWatch(finish, setup.goal)
-        self._ending: Ending | None = None
-        self._period = run.ctrl.config.period
-        self.ticks: list[Tick] = []
-        self.postures: list[Array] = []  # where the arm really was: a fault may report another
+    Returns:
+        The ticks; (n, n_q) where the arm really was, whatever a fault reports; how it ended, None
+        where its time is up.
+    """
+    scenario, period = run.setup.scenario, run.ctrl.config.period
+    record = None if recorder is None else TrialRecorder(recorder, run)
+    finish = scenario.ends()
+    watch = None if finish is None else GoalWatch(finish, run.setup.goal)
+    beat = max(round(0.1 * scenario.simulation.control_hz), 1)
+    ending = None
+    ticks: list[Tick] = []
+    postures: list[Array] = []
+    for inputs, result in run.ticks():
+        q, elapsed = run.source.q, len(ticks) * period
+        leaked = 0 if run.known is not None else _leaked(run)
+        true = NOT_ASKED if truth is None else truth(q, elapsed)
+        tick = Tick(inputs, result, TickTruth(true.distance, true.link, true.own, leaked))
+        ticks.append(tick)
+        postures.append(q)
+        if record is not None:
+            record.write(tick, elapsed, q)
+        if len(ticks) % beat == 0:
+            on_progress(min(len(ticks) * period / scenario.duration, 1.0))
+        if watch is not None:
+            ending = watch(elapsed, np.asarray(run.setup.robot.tool_pose(q)))
+            if ending is not None:
+                break
+    on_progress(1.0)
+    return ticks, np.array(postures), ending
 
-    @property
-    def elapsed(self) -> Array:
-        """(n,) [s] of each tick; not the ticks' own time, which a fault may make jump."""
-        return np.arange(len(self.ticks), dtype=np.float64) * self._period
 
-    def run(self) -> None:
-        """Until the scenario's end, or the goal's."""
-        run, scenario = self._run, self._run.setup.scenario
-        beat = max(round(0.1 * scenario.simulation.control_hz), 1)
-        for inputs, result in run.ticks():
-            q, elapsed = run.source.q, len(self.ticks) * self._period
-            leaked = 0 if run.known is not None else _leaked(run)
-            true = NOT_ASKED if self._truth is None else self._truth(q, elapsed)
-            tick = Tick(inputs, result, TickTruth(true.distance, true.link, true.own, leaked))
-            self.ticks.append(tick)
-            self.postures.append(q)
-            if self._recorder is not None:
-                self._recorder.write(tick, elapsed, q)
-            if self._on_progress is not None and len(self.ticks) % beat == 0:
-                self._on_progress(min(len(self.ticks) * self._period / scenario.duration, 1.0))
-            if self._watch is not None:
-                self._ending = self._watch(elapsed, np.asarray(run.setup.robot.tool_pose(q)))
-                if self._ending is not None:
-                    break
-        if self._on_progress is not None:
-            self._on_progress(1.0)
+def _conclude(
+    run: Assembly, ending: Ending | None, last: TickResult, q: Array, time: float
+) -> Ending | None:
+    """How the run ended, and what held the arm; None where its scenario has no such end."""
+    if run.setup.scenario.ends() is None:
+        return None
+    cloud_W = np.asarray(run.ctrl.cloud_W()) if run.known is None else run.known(time)
+    ending = ending or Ending("aborted", "the time is up")
+    return concluded(run.setup, ending, last, q, cloud_W, time)
 
-    def conclude(self) -> Ending | None:
-        """How the run ended, and what held the arm; None where its scenario has no such end."""
-        if self._watch is None:
-            return None
-        run, last = self._run, (len(self.ticks) - 1) * self._period
-        cloud_W = np.asarray(run.ctrl.cloud_W()) if run.known is None else run.known(last)
-        ending = self._ending or Ending("aborted", "the time is up")
-        return concluded(run.setup, ending, self.ticks[-1].result, self.postures[-1], cloud_W, last)
 
-    def ask_sparse_truth(self, hz: float) -> None:
-        """Adds the true distances that decide, of the last ticks, and so many a second."""
-        setup, elapsed = self._run.setup, self.elapsed
-        asked = sparse_ground_truth(
-            setup.robot, setup.measured, elapsed, np.array(self.postures),
-            final_ticks(elapsed) | sampled_ticks(elapsed, hz), under=TOO_CLOSE,
-        )  # fmt: skip
-        columns = zip(self.ticks, asked.distance, asked.link, asked.own, strict=True)
-        self.ticks = [
-            replace(tick, truth=TickTruth(float(distance), link, float(own), tick.truth.leaked))
-            for tick, distance, link, own in columns
-        ]
+def _with_truth(
+    ticks: Sequence[Tick], elapsed: Array, q: Array, setup: Setup, wanted: Bools
+) -> list[Tick]:
+    """The ticks with the true distances that are wanted or decide."""
+    asked = sparse_ground_truth(setup.robot, setup.measured, elapsed, q, wanted, under=TOO_CLOSE)
+    columns = zip(ticks, asked.distance, asked.link, asked.own, strict=True)
+    return [
+        replace(tick, truth=TickTruth(float(distance), link, float(own), tick.truth.leaked))
+        for tick, distance, link, own in columns
+    ]
+
+
+def _with_coverage(log: TrialLog, setup: Setup, q: Array) -> TrialLog:
+    """The log with what the sensors had in view of the truly closest points."""
+    found = replace(log, coverage=coverage_of(setup, q, log.elapsed))
+    if not setup.measured.solids:
+        return found
+    moments = (found.nearest_tick, len(log.elapsed) - 1)
+    at_nearest, at_end = sightings(setup, q, log.elapsed, moments)
+    return replace(found, sightings=(at_nearest, at_end))
 
 
 def _leaked(run: Assembly) -> int:
     """How many points of the filtered cloud really are the robot itself."""
     origins = np.asarray(run.ctrl.cloud_origins())[: run.ctrl.seen_points]
     return int(run.source.saw_robot[origins[:, 0], origins[:, 1]].sum())
-
-
-def _with_coverage(log: TrialLog, setup: Setup, postures: Array) -> TrialLog:
-    """The log with what the sensors had in view of the truly closest points."""
-    found = replace(log, coverage=coverage_of(setup, postures, log.elapsed))
-    if not setup.measured.solids or not len(log.elapsed):
-        return found
-    moments = (found.nearest_tick, len(log.elapsed) - 1)
-    at_nearest, at_end = sightings(setup, postures, log.elapsed, moments)
-    return replace(found, sightings=(at_nearest, at_end))

@@ -78,17 +78,12 @@ class WalkLog:
         """One cycle more; `bounds` are qd_UB and qdd_UB, for what is true."""
         k = self.cycles
         self.time[k] = time
-        self.q[k] = physics.q
-        self.qd[k] = physics.qd
-        self.tool_W[k] = physics.tool_W
+        for name in ("q", "qd", "tool_W"):
+            getattr(self, name)[k] = getattr(physics, name)
         self.force[k] = 0.0 if force is None else np.sqrt(force[:3] @ force[:3])
-        self.tcp_speed[k] = out.tcp_speed
-        self.distance[k] = out.distance
-        self.velocity[k] = out.velocity
+        for name in (*_TRUE, "speed_ratio", "acceleration_ratio", "torque"):
+            getattr(self, name)[k] = getattr(out, name)
         self.protective_m[k] = out.protective_distance
-        self.speed_ratio[k] = out.speed_ratio
-        self.acceleration_ratio[k] = out.acceleration_ratio
-        self.torque[k] = out.torque
         self.overrun = self.overrun or out.overrun
         if out.trips > len(self.trips):
             trip = out.trip
@@ -97,9 +92,8 @@ class WalkLog:
                      limit=trip.limit)
             )  # fmt: skip
         if truth is not None:
-            self.true_tcp_speed[k] = truth.tcp_speed
-            self.true_distance[k] = truth.distance
-            self.true_velocity[k] = truth.velocity
+            for name in _TRUE:
+                getattr(self, f"true_{name}")[k] = getattr(truth, name)
             self.true_speed_ratio[k] = (np.abs(physics.qd) / bounds[0]).max()
             self.true_acceleration_ratio[k] = (np.abs(physics.acceleration) / bounds[1]).max()
         self.cycles += 1
@@ -185,6 +179,7 @@ class WalkLog:
 
 
 _ROUNDING = 1e-9
+_TRUE = ("tcp_speed", "distance", "velocity")  # what the simulator is asked too
 _COLUMNS = (
     "time", "force", "tcp_speed", "distance", "velocity", "protective_m", "speed_ratio",
     "acceleration_ratio", "true_tcp_speed", "true_distance", "true_velocity",

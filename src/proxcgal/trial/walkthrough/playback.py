@@ -10,6 +10,7 @@ import numpy as np
 from proxcgal.core.errors import ConfigError
 from proxcgal.core.typing import Array
 from proxcgal.models import Robot
+from proxcgal.trial.walkthrough.guarded_arm import GuardedArm
 from proxcgal.trial.walkthrough.log import WalkLog
 from proxcgal.trial.walkthrough.setup import PERIOD, WalkSetup
 from proxcgal.trial.walkthrough.taught_path import TaughtPath, needed_scale, tool_positions
@@ -52,14 +53,13 @@ def play(setup: WalkSetup, path: TaughtPath, q: Array | None = None) -> Playback
     path_time: Array = np.arange(run, dtype=np.float64) * PERIOD / scale
     wanted, speeds = path.at(path_time)
     speeds /= scale
-    guard, physics = setup.make_guard(), setup.make_physics(q)
+    arm = GuardedArm(setup, q)
+    physics, bounds = arm.physics, arm.bounds
     log = WalkLog.empty(start + run, setup.robot.n_q, PERIOD, setup.scenario.guard)
-    bounds = (np.array(guard.qd_bounds), np.array(guard.qdd_bounds))
     still, sent = np.zeros_like(q), q.copy()
     for k in range(start + run):
         time = k * PERIOD
-        human = physics.human_velocity() if setup.scenario.guard.subtract_human else None
-        out = guard.cycle(time, physics.q, physics.qd, time >= _RESET_AT, human)
+        out = arm.watch(time, time >= _RESET_AT)
         log.add(time, physics, out, None, None, bounds)
         if k == start and not log.trips:
             check_start(setup.robot, physics.q, path, keys.start_tolerance)
@@ -72,7 +72,7 @@ def play(setup: WalkSetup, path: TaughtPath, q: Array | None = None) -> Playback
             row = k - start
             command = speeds[row] + _PULL * (wanted[row] - sent)
         sent += PERIOD * command
-        physics.step(command, out.torque)
+        arm.drive(command)
     log.cut()
     played = log.tool_W[start : start + run]
     inside = path_time <= path.duration

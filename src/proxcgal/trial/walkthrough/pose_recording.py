@@ -17,7 +17,7 @@ from mcap.records import Message, Metadata
 from mcap.stream_reader import StreamReader
 
 from proxcgal.core.errors import RecordingError
-from proxcgal.core.typing import Array, Bools
+from proxcgal.core.typing import Array
 from proxcgal.core.versions import versions
 from proxcgal.recording.foxglove import nanoseconds
 from proxcgal.recording.mcap_file import SETTINGS, McapFile
@@ -78,10 +78,6 @@ class RecordedPoses:
     about: Mapping[str, str]
     time: Array  #: (n,) [s]
     q: Array  #: (n, n_q) [rad]
-    position_W: Array  #: (n, 3) [m] of the tool
-    rotation_WT: Array  #: (n, 3, 3)
-    force: Array  #: (n, 6) [N], [N m]
-    torque: Bools  #: (n,)
     damage: str | None  #: why reading ended early; None for a whole file
 
 
@@ -112,14 +108,8 @@ def read_poses(path: str | Path) -> RecordedPoses:
             f"recording {path}: holds no poses of a teaching" + (f": {damage}" if damage else "")
         )
 
-    def column(name: str) -> Array:
-        return np.array([row[name] for row in rows], np.float64)
-
-    return RecordedPoses(
-        path, about, column("time"), column("q"), column("position"),
-        column("rotation").reshape(-1, 3, 3), column("force"),
-        np.array([row["torque"] for row in rows], np.bool_), damage,
-    )  # fmt: skip
+    time, q = (np.array([row[name] for row in rows], np.float64) for name in ("time", "q"))
+    return RecordedPoses(path, about, time, q, damage)
 
 
 def _row(message: Message, number: int) -> dict[str, object]:
