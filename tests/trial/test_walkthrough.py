@@ -354,7 +354,7 @@ def test_a_pair_that_is_always_violated_is_refused() -> None:
 
 
 def test_what_is_monitored_accepted_and_missing_is_told(short: WalkSetup) -> None:
-    told = "\n".join(short.told())
+    told = "\n".join(short.notes())
     assert "distance to the operator: link_1, link_2, link_3, link_4" in told
     assert "accepted joint_stop.joint_6" in told
     assert "ISO/TS 15066 would be 0.98 m" in told

@@ -64,7 +64,7 @@ def last_seen(
 ) -> Array:
     """(n,) [s] stamp of the last posture that had each point in view, -inf where none had.
 
-    Only the robot hides anything: what a scene hides is in nobody's way where it stands.
+    Only the robot itself hides points; occlusion by the scene is ignored.
 
     Args:
         setup: robot and sensors.

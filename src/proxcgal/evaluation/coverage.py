@@ -32,7 +32,7 @@ class Coverage:
         return {f"{name}_share": float(share) for name, share in asdict(self).items()}
 
 
-#: Where nobody asked.
+#: Where it was not evaluated.
 NO_COVERAGE = Coverage()
 
 

@@ -31,7 +31,7 @@ class TrueDistances(NamedTuple):
     obstacle_W: Array | None = None  #: (3,) [m] its nearest point
 
 
-#: Where nobody wanted to know.
+#: Where it was not computed.
 NOT_ASKED = TrueDistances(np.nan, "", np.nan)
 
 

@@ -34,11 +34,11 @@ class StallCause:
         }
         if not self.task:
             return "no single task holds it"
-        told = words.get(self.task, f"held by {self.task}")
+        text = words.get(self.task, f"held by {self.task}")
         parts = [part for part in (self.link, self.obstacle) if part]
         if self.sensor >= 0:
             parts.append(f"sensor {self.sensor}, zone {self.zone}")
-        return told + (f" ({', '.join(parts)})" if parts else "")
+        return text + (f" ({', '.join(parts)})" if parts else "")
 
 
 @dataclass(frozen=True, slots=True)

@@ -103,7 +103,7 @@ def goal_pose(goal: JointGoal, T_WE: Array) -> Array:
     turn = None if goal.rpy is None else transforms.rotation(goal.rpy)  # (4.2)
     if goal.frame == END_EFFECTOR:
         T_WT[:3, :3] = T_WE[:3, :3] if turn is None else T_WE[:3, :3] @ turn  # (4.4)
-        T_WT[:3, 3] = T_WE[:3, 3] + T_WE[:3, :3] @ np.asarray(goal.translation)  # (4.6), mended
+        T_WT[:3, 3] = T_WE[:3, 3] + T_WE[:3, :3] @ np.asarray(goal.translation)  # (4.6), corrected
     else:
         T_WT[:3, :3] = T_WE[:3, :3] if turn is None else turn  # (4.3)
         T_WT[:3, 3] = goal.translation  # (4.5)

@@ -17,7 +17,7 @@ from proxcgal.scenario.setup import Setup
 from proxcgal.server.goals import AT_REST
 from proxcgal.sim.actuation import Actuation
 from proxcgal.sim.loop import run_ticks
-from proxcgal.sim.tick import Tick, TickInput, TickResult, TickTruth
+from proxcgal.sim.tick import TickInput, TickResult
 
 
 class JointArm:
@@ -132,11 +132,10 @@ class JointArm:
         """Velocity until the next tick (n_q,)."""
         self._actuation.qd = qd
 
-    def asked(self) -> tuple[Tick, Array]:
-        """The last tick, and the points (n, 3) that it would be given now [m]."""
-        assert self.last is not None
-        inputs = TickInput(time=self.time, q=self.q, goal=self.setup.goal, known=True)
-        return Tick(inputs, self.last, TickTruth()), np.array(self._cloud(self.time))
+    @property
+    def points_W(self) -> Array:  # noqa: N802  a frame's suffix
+        """(n, 3) points of the scene now [m]."""
+        return self._cloud(self.time)
 
     def _start(self, q: Array) -> None:
         """A new controller for the arm at rest at a posture; its clock begins at 0."""

@@ -3,8 +3,9 @@
 MuJoCo casts the rays at the scene; at the robot's own links, with their tens of thousands of faces,
 our trees cast them four times faster, with the same hits (tested).
 
-The only module that knows MuJoCo. Nothing is stepped: the arm follows its velocity commands
-exactly and the scene its paths, so poses are set, and rays and pictures are taken at them.
+Beside `physics` the only module that imports MuJoCo. Nothing is stepped: the arm follows its
+velocity commands exactly and the scene its paths, so poses are set, and rays and pictures are taken
+at them.
 """
 
 from __future__ import annotations
@@ -242,8 +243,8 @@ class World:
         if any(numbers) and not self._warnings:
             self._warnings.append(f"warning counters {numbers}")
         if self._warnings:
-            told, self._warnings[:] = "; ".join(self._warnings), []
-            raise SimulationError(f"MuJoCo warned: {told}")
+            found, self._warnings[:] = "; ".join(self._warnings), []
+            raise SimulationError(f"MuJoCo warned: {found}")
 
     def _shape(self, solids: Sequence[Solid]) -> None:
         """Gives the compiled solids their sizes, and all that MuJoCo derives of them."""

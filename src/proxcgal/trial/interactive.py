@@ -1,4 +1,4 @@
-"""A trial that goes on for as long as somebody watches: solids moved by hand, sensors silenced.
+"""A trial without end, driven by a page: solids moved by hand, sensors silenced.
 
 The same way through as every trial: source -> injected faults -> tick.
 """
@@ -29,7 +29,7 @@ _ENDLESS = 1e7  # [s]
 
 
 class LiveTrial:
-    """A scenario that has no end and takes what somebody does to it, between two ticks."""
+    """A scenario without end that takes a user's changes between two ticks."""
 
     def __init__(
         self,
@@ -99,7 +99,7 @@ class LiveTrial:
 
     @property
     def stopped(self) -> bool:
-        """Is the controller in STOP? Nothing that the trial is told leads out of it."""
+        """Is the controller in STOP? No request of a user leads out of it."""
         return self._last is not None and self._last[1].mode == STOP
 
     @property
@@ -122,7 +122,7 @@ class LiveTrial:
     def move(self, name: str, wanted: Array) -> None:
         """Has a hand take a solid to a pose (4, 4) T_WO; unknown names are passed over.
 
-        `HAND`, of a guided arm, is the hand at the tool: it no longer goes its own way then.
+        `HAND`, of a guided arm, is the hand at the tool: from then on a user moves it.
         """
         if name == HAND and isinstance(self._source, GuidedSource):
             self._source.take_over().move(self._tool(), wanted)
@@ -151,7 +151,7 @@ class LiveTrial:
         )  # fmt: skip
 
     def _hand(self) -> dict[str, Any]:
-        """The hand at the tool of a guided arm: where it is, and whether somebody holds it."""
+        """The hand at the tool of a guided arm: where it is, and whether a user holds it."""
         if not isinstance(self._source, GuidedSource):
             return {}
         hand = self._source.user_hand

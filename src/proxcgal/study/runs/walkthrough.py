@@ -40,7 +40,7 @@ def run_walkthrough(
     announce(f"setting up {scenario.name}", quiet=quiet)
     setup = WalkSetup.of(scenario)
     check_duration(scenario)  # before the files of an older run are removed
-    told = setup.told()
+    told = setup.notes()
     print("\n".join(told))
     made = ready([folder])
     for name in (RECORDING, FIGURE, TABLE, TRAJECTORY, RATINGS):

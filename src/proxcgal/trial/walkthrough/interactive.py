@@ -1,6 +1,6 @@
-"""A walk-through cell that runs for as long as somebody watches, and pulls the tool by hand.
+"""A walk-through without end, driven by a page: a user pulls the tool by hand.
 
-Cycle by cycle the cell of every run: guard, hand guiding, weight and brakes.
+Cycle by cycle the arm of every run: guard, hand guiding, weight and brakes.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class WalkMoment(Posed):
 
     state: str  #: of the guard: 'off', 'on', 'stopping'
     trips: int  #: so far
-    trip: str  #: the last one in words, "" before the first
+    trip: str  #: the last one as text, "" before the first
     violated: tuple[str, ...]  #: safety functions, in the last cycle
     overrun: bool  #: not at rest in the declared time: it can't be switched on any more
     refused: str  #: why switching on was refused last, "" where it was not
@@ -72,7 +72,7 @@ class WalkMoment(Posed):
 
 
 class WalkTrial:
-    """One cell, as `LiveTrial` is one scene. Torque is off until somebody switches it on."""
+    """One cell, as `LiveTrial` is one scene. Torque is off until a user switches it on."""
 
     def __init__(self, scenario: WalkScenario, setup: WalkSetup | None = None) -> None:
         """Args: the setup is the scenario's, where it is made already.
@@ -106,7 +106,7 @@ class WalkTrial:
 
     @property
     def stopped(self) -> bool:
-        """Has a stop taken longer than declared? Nothing that the trial is told leads out of it."""
+        """Has a stop taken longer than declared? No request of a user leads out of it."""
         return bool(self._out.overrun)
 
     def again(self) -> WalkTrial:

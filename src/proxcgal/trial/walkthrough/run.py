@@ -77,7 +77,7 @@ def run_walk(
         setup: of the scenario.
         seed: fixes the operator's tremor.
         recording: gets every pose of the teaching.
-        on_progress: told the share of the teaching that is done.
+        on_progress: gets the share of the teaching that is done.
 
     Raises:
         ConfigError: what does not fit, or a recording that cannot be written.

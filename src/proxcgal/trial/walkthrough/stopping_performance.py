@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from proxcgal.sim.physics import Physics
-from proxcgal.trial.walkthrough.log import WalkLog
 from proxcgal.trial.walkthrough.setup import PERIOD, WalkSetup
 from proxcgal.trial.walkthrough.teaching import teach
 
@@ -23,7 +22,7 @@ _WATCHED = 3.0  # [s] after the torque is cut
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StoppingPerformance:
-    """One stop."""
+    """Time and distance of one stop."""
 
     case: str
     brake_scale: float  #: of the arm's own brakes' torques
@@ -41,14 +40,20 @@ def stops_with_other_brakes(setup: WalkSetup, seed: int) -> list[StoppingPerform
         other = replace(setup, scenario=setup.scenario.model_copy(update={"arm": arm}))
         log = teach(other, seed=seed)
         if log.trips:
-            stops.append(_stop("as run", arm.brake_scale, log))
+            time, distance = log.stop_time_s() or 0.0, log.stop_distance_m() or 0.0
+            stops.append(
+                StoppingPerformance(
+                    case="as run", brake_scale=arm.brake_scale, stop_time_s=time,
+                    stop_distance_m=distance,
+                )
+            )  # fmt: skip
     return stops
 
 
 def worst_case_stops(setup: WalkSetup) -> list[StoppingPerformance]:
     """Stretched level, 5 kg more on the gun, 1.30 m/s downwards, with the same brakes.
 
-    None where `worst_case_problem` tells why.
+    None where there is a `worst_case_problem`.
     """
     return [] if worst_case_problem(setup) else [_worst(setup, scale) for scale in BRAKE_SCALES]
 
@@ -56,16 +61,16 @@ def worst_case_stops(setup: WalkSetup) -> list[StoppingPerformance]:
 def worst_case_problem(setup: WalkSetup) -> str | None:
     """Why an arm is not looked at in the worst posture, which is that of `ga_ol`; None: it is."""
     robot, q = setup.robot, np.array(STRETCHED)
-    told = f"worst posture left out: that of ga_ol does not fit {robot.name}: "
+    text = f"worst posture left out: that of ga_ol does not fit {robot.name}: "
     if robot.n_q != len(q):
-        return told + f"{robot.n_q} joints, not {len(q)}"
+        return text + f"{robot.n_q} joints, not {len(q)}"
     outside = np.flatnonzero((q < robot.q_min) | (q > robot.q_max))
     if len(outside):
         names = ", ".join(robot.joint_names[row] for row in outside)
-        return told + f"it is beyond the limits of {names}"
+        return text + f"it is beyond the limits of {names}"
     way_W = np.asarray(robot.tool_jacobian(q))[:3, _SINKING]
     if -way_W[2] < _DOWN * np.linalg.norm(way_W) or not way_W.any():
-        return told + f"{robot.joint_names[_SINKING]} does not bring the tool down there"
+        return text + f"{robot.joint_names[_SINKING]} does not bring the tool down there"
     return None
 
 
@@ -95,11 +100,4 @@ def _worst(setup: WalkSetup, scale: float) -> StoppingPerformance:
         case="worst posture", brake_scale=brakes,
         stop_time_s=last * PERIOD if last < watched else float("inf"),
         stop_distance_m=float(np.linalg.norm(np.diff(tool, axis=0), axis=1).sum()),
-    )  # fmt: skip
-
-
-def _stop(case: str, scale: float, log: WalkLog) -> StoppingPerformance:
-    return StoppingPerformance(
-        case=case, brake_scale=scale, stop_time_s=log.stop_time_s() or 0.0,
-        stop_distance_m=log.stop_distance_m() or 0.0,
     )  # fmt: skip

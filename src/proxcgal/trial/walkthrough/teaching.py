@@ -52,7 +52,7 @@ def teach(
         seed: fixes the operator's tremor.
         recorder: gets every pose; the caller closes it.
         with_truth: ask the simulator too, in every cycle, what the guard should find.
-        on_progress: told the share that is done, 0 to 1, every 0.1 s simulated.
+        on_progress: gets the share that is done, 0 to 1, every 0.1 s simulated.
 
     Raises:
         ConfigError: a guard that contradicts itself.
