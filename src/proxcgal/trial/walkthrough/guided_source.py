@@ -57,7 +57,7 @@ class GuidedSource(SimulatedSource):
         if self.user_hand is None:
             force, engaged = self._hand.force(self._cycle, *tool), True
         else:
-            force, engaged = self.user_hand.force(*tool), self.user_hand.holds
+            force, engaged = self.user_hand.force(*tool), self.user_hand.pose is not None
         wanted = np.array(self._admittance.step(force, engaged, self._pace))
         self._cycle += 1
         goal = T.copy()

@@ -169,14 +169,14 @@ class WalkTrial:
         if pressed:
             self._refused = self._reason() if out.reset_refused else ""
         force = self._nothing
-        if grip.holds:
+        if grip.pose is not None:
             force = grip.force(physics.tool_W, physics.tool_R, physics.tool_twist())
             if not out.torque:
                 grip.feel_stop()
         if out.torque and not was_on:
             self._refused = ""
         self._force = float(np.linalg.norm(force[:3]))
-        self._arm.move(force, grip.holds)
+        self._arm.move(force, grip.pose is not None)
         self._cycle += 1
 
     def _reason(self) -> str:

@@ -22,19 +22,9 @@ class InteractiveHand:
         self._keys = keys
         self._period = period
         self._pull = HandImpedance(keys, period)
-        self._pose: Array | None = None
+        self.pose: Array | None = None  #: (4, 4) T_W of the hand; None where it holds nothing
         self._wanted = np.eye(4)
         self._twist = np.zeros(6)
-
-    @property
-    def holds(self) -> bool:
-        """Does it hold the tool?"""
-        return self._pose is not None
-
-    @property
-    def pose(self) -> Array | None:
-        """(4, 4) T_W of the hand; None where it holds nothing."""
-        return self._pose
 
     def move(self, tool: Array, wanted: Array) -> None:
         """Takes the tool, where it does not hold it yet, and says where the hand is to go.
@@ -43,15 +33,15 @@ class InteractiveHand:
             tool: (4, 4) T_WT where the tool is.
             wanted: (4, 4) of the hand; it turns at once, and goes there at bounded speed.
         """
-        if self._pose is None:
-            self._pose = np.array(tool)
+        if self.pose is None:
+            self.pose = np.array(tool)
             self._pull = HandImpedance(self._keys, self._period)
             self._twist[:] = 0.0
         self._wanted = np.array(wanted)
 
     def let_go(self) -> None:
         """Pulls no more."""
-        self._pose = None
+        self.pose = None
 
     def force(self, position: Array, rotation: Array, twist: Array) -> Array:
         """One step: what it does at the tool's origin (6,), in world [N], [N m].
@@ -61,11 +51,11 @@ class InteractiveHand:
             rotation: (3, 3) R_WT.
             twist: (6,) of the tool, linear first [m/s], [rad/s].
         """
-        if self._pose is None:
+        if self.pose is None:
             return np.zeros(6)
-        self._advance(self._pose)
+        self._advance(self.pose)
         return self._pull.force(
-            (position, rotation, twist), self._pose[:3, 3], self._pose[:3, :3], self._twist
+            (position, rotation, twist), self.pose[:3, 3], self.pose[:3, :3], self._twist
         )
 
     def _advance(self, pose: Array) -> None:

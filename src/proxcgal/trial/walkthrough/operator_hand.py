@@ -25,14 +25,9 @@ class HandImpedance:
         """Args: one step takes `period` [s]."""
         self._keys = keys
         self._period = period
-        self._delay = round(keys.reaction_time / period)
+        self.delay = round(keys.reaction_time / period)  #: steps of the reaction time
         self._stopped_for = 0
         self._force = np.zeros(6)
-
-    @property
-    def delay(self) -> int:
-        """Steps of the reaction time."""
-        return self._delay
 
     @property
     def gone(self) -> bool:
@@ -65,7 +60,7 @@ class HandImpedance:
         force[3:] += keys.turn_damping * (twist[3:] - tool[2][3:])
         _bound(force[:3], keys.max_force)
         _bound(force[3:], keys.max_torque)
-        if self._stopped_for > self._delay:
+        if self._stopped_for > self.delay:
             force *= max(self._held(), 0.0)
         return force
 
@@ -75,7 +70,7 @@ class HandImpedance:
 
     def _held(self) -> float:
         """Share of the force that a hand has left which notices a stop."""
-        return 1.0 - (self._stopped_for - self._delay) * self._period / _LETTING_GO
+        return 1.0 - (self._stopped_for - self.delay) * self._period / _LETTING_GO
 
 
 class OperatorHand:
