@@ -12,7 +12,8 @@ from proxcgal.models import mount_check
 from proxcgal.scenario.keys import Fault
 from proxcgal.scenario.loading import Scenario, load_scenario
 from proxcgal.scenario.setup import Setup
-from proxcgal.sim.mount_faults import SCANS, RealMounts
+from proxcgal.sim.assembly import MOUNT_CHECK_SCANS
+from proxcgal.sim.mount_faults import RealMounts
 from proxcgal.sim.source import SimulatedSource
 from proxcgal.sim.world import World
 from proxcgal.trial.trial import run_trial
@@ -24,7 +25,7 @@ SIGNS = ("", "-")
 def looked(setup: Setup, faults: tuple[Fault, ...] = (), seed: int = 0) -> px.MountChecks:
     own = replace(setup, scenario=setup.scenario.model_copy(update={"faults": faults}))
     source = SimulatedSource(own, World(own.robot, own.scene), seed)
-    return px.check_mounts(own.robot, own.skin, own.q0, source.standing(SCANS))
+    return px.check_mounts(own.robot, own.skin, own.q0, source.standing(MOUNT_CHECK_SCANS))
 
 
 @pytest.fixture(scope="module", params=SCENES)
@@ -81,7 +82,7 @@ def test_a_sensor_that_sees_no_body_is_not_judged(setup: Setup) -> None:
 def test_something_before_the_body_makes_no_mount_wrong(setup: Setup) -> None:
     source = SimulatedSource(setup, World(setup.robot, setup.scene), 0)
     scans = []
-    for scan in source.standing(SCANS):
+    for scan in source.standing(MOUNT_CHECK_SCANS):
         ranges = np.array(scan.ranges)
         ranges[::3] = np.maximum(ranges[::3] - 0.07, 0.0)  # too near to be told is nothing told
         scans.append(px.Scan(scan.sensor, scan.counter, scan.stamp, ranges, scan.status))

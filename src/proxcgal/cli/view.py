@@ -95,7 +95,7 @@ def _check(scenario: Scenario, controller: str | None) -> None:
             f'--controller {controller}: {scenario.name} has kind = "walkthrough", where a hand '
             "guides the arm: no controllers to choose from"
         )
-    print("\n".join(WalkSetup.of(scenario).told()))
+    print("\n".join(WalkSetup.of(scenario).notes()))
 
 
 def checked_token(host: str, port: int, token: str | None) -> str | None:

@@ -6,18 +6,16 @@ proves it: between two postures a distance shrinks by no more than the two surfa
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from proxcgal import _core
 from proxcgal.core.transforms import inverse, placed
 from proxcgal.core.typing import Array
+from proxcgal.models.robots import Robot
 from proxcgal.models.surfaces import Surfaces, moved
-
-if TYPE_CHECKING:
-    from proxcgal.models.robots import Robot
-    from proxcgal.scene.obstacles import Scene
+from proxcgal.scene.obstacles import Scene
 
 #: Looked for beyond the least distance so far, so that a far pair is not asked at every tick [m].
 AHEAD_M = 0.05
@@ -33,7 +31,7 @@ class TrueDistances(NamedTuple):
     obstacle_W: Array | None = None  #: (3,) [m] its nearest point
 
 
-#: Where nobody wanted to know.
+#: Where it was not computed.
 NOT_ASKED = TrueDistances(np.nan, "", np.nan)
 
 

@@ -1,4 +1,4 @@
-"""What trials amount to: the numbers of `summary.json`, as the experiments ask for them."""
+"""The numbers of `summary.json`, and files that are whole or not there."""
 
 from __future__ import annotations
 
@@ -9,16 +9,14 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from numbers import Integral
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from proxcgal.core.errors import ConfigError
-
-if TYPE_CHECKING:
-    from proxcgal.trial.trial import TrialLog
+from proxcgal.evaluation.trial_log import NOTHING, TrialLog
 
 Summary = dict[str, Any]
 
-NOTHING_M = 9.99  # [m] how a distance to nothing is written
+NOTHING_M = NOTHING  # [m] how a distance to nothing is written
 SELF_LIMIT_M = 0.02  # [m] a run whose own links come nearer than this has failed
 CONTROLLER_KEYS = (
     "true_min_m",
@@ -30,7 +28,7 @@ CONTROLLER_KEYS = (
 )
 
 
-#: What of the closest points could be known, see `sim.coverage`.
+#: What of the closest points could be known, see `evaluation.coverage`.
 COVERAGE_KEYS = ("in_view_share", "remembered_share", "forgotten_share", "never_seen_share")
 
 
@@ -45,9 +43,9 @@ def static_summary(logs: Sequence[TrialLog]) -> Summary:
         distance at the end [m] (mean of the last 2 s), least seen distance [m], goal error at the
         end [m], violations (ticks with a true distance under 0.05 m), least distance between own
         links [m]), `closest_points` (per controller: what shares of the truly closest points the
-        sensors had in view, see `sim.coverage`), `gain_mm` (true distance at the end, wb over sm;
-        None where one did not run), `self_min_m` of all trials and `failed`, true where that is
-        under 0.02 m. What does not apply is None, a distance to nothing 9.99.
+        sensors had in view, see `evaluation.coverage`), `gain_mm` (true distance at the end,
+        wb over sm; None where one did not run), `self_min_m` of all trials and `failed`, true where
+        that is under 0.02 m. What does not apply is None, a distance to nothing 9.99.
 
     Raises:
         ConfigError: no log, logs of different scenarios, robots or seeds, a controller twice.
@@ -130,12 +128,12 @@ def coverage_lines(scene: str, controllers: Mapping[str, Mapping[str, float | No
     lines = []
     for name, numbers in controllers.items():
         shares = [numbers.get(key) for key in COVERAGE_KEYS]
-        told = [100.0 * share for share in shares if share is not None]
-        if len(told) == len(shares):
+        percent = [100.0 * share for share in shares if share is not None]
+        if len(percent) == len(shares):
             lines.append(
-                f"{scene}, {name}: of the truly closest points {told[0]:.0f} % were in view, "
-                f"{told[1]:.0f} % within the memory's time before, {told[2]:.0f} % earlier, "
-                f"{told[3]:.0f} % never"
+                f"{scene}, {name}: of the truly closest points {percent[0]:.0f} % were in view, "
+                f"{percent[1]:.0f} % within the memory's time before, {percent[2]:.0f} % earlier, "
+                f"{percent[3]:.0f} % never"
             )
     return lines
 

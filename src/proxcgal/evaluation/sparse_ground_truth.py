@@ -7,7 +7,6 @@ no new least and no violation is not asked: least values, counts and what is ask
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +15,10 @@ from proxcgal import _core
 from proxcgal.core.transforms import inverse
 from proxcgal.core.typing import Array, Bools
 from proxcgal.evaluation.ground_truth import AHEAD_M, solid_distance
+from proxcgal.models.robots import Robot
 from proxcgal.models.surfaces import Surfaces, moved
-
-if TYPE_CHECKING:
-    from proxcgal.models.robots import Robot
-    from proxcgal.scene.obstacles import Scene
-    from proxcgal.scene.solids import Solid
+from proxcgal.scene.obstacles import Scene
+from proxcgal.scene.solids import Solid
 
 #: Round ticks that are asked in turn: beyond, their neighbours say more.
 NEAR_TICKS = 25

@@ -1,4 +1,4 @@
-"""What stopped the arm: the task without which it would go on, its link and what it keeps off."""
+"""Finds the task that blocks progress, its link, and the obstacle."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def concluded(
         setup: of the run.
         ending: without what held the arm.
         last: of the run's ticks.
-        q: (n_q,) where the arm really stands, whatever a fault told the controller.
+        q: (n_q,) where the arm really stands, whatever a fault reports.
         points_W: (n, 3) what the controller was given, or saw, last [m].
         time: of the scene, at that tick [s].
     """

@@ -34,11 +34,11 @@ class StallCause:
         }
         if not self.task:
             return "no single task holds it"
-        told = words.get(self.task, f"held by {self.task}")
+        text = words.get(self.task, f"held by {self.task}")
         parts = [part for part in (self.link, self.obstacle) if part]
         if self.sensor >= 0:
             parts.append(f"sensor {self.sensor}, zone {self.zone}")
-        return told + (f" ({', '.join(parts)})" if parts else "")
+        return text + (f" ({', '.join(parts)})" if parts else "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,16 +60,12 @@ class GoalWatch:
         self._least = [np.inf, np.inf]  # [m], [rad] that counted as progress last
         self._since = 0.0
 
-    def errors(self, T_WT: Array) -> tuple[float, float]:
-        """Distance [m] and angle [rad] from the tool to the goal."""
-        return pose_errors(T_WT, self._goal)
-
     def __call__(self, time: float, T_WT: Array) -> Ending | None:
         """How the run ends here, or None: it goes on.
 
         Progress is a least error so far, in position or in angle, that fell by a set amount.
         """
-        errors, finish = self.errors(T_WT), self._finish
+        errors, finish = pose_errors(T_WT, self._goal), self._finish
         if errors[0] <= finish.position and errors[1] <= finish.angle:
             return Ending("succeeded", "the goal is reached")
         for row, error in enumerate(errors):

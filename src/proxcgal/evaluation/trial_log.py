@@ -179,7 +179,7 @@ def _points(points: Sequence[Sequence[float] | None]) -> Array:
 
 
 def _tool(robot: Robot, q: Array) -> Array:
-    """(4, 4) T_WT; nan where a fault told the controller no posture."""
+    """(4, 4) T_WT; nan where a fault reports no posture."""
     return np.asarray(robot.tool_pose(q)) if np.isfinite(q).all() else np.full((4, 4), np.nan)
 
 

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from proxcgal.core.typing import Array, Bools
+from proxcgal.scenario.setup import Setup
+from proxcgal.scene.obstacles import Scene
 from proxcgal.sim.world import World
-
-if TYPE_CHECKING:
-    from proxcgal.scenario.setup import Setup
-    from proxcgal.scene.obstacles import Scene
 
 _BEFORE_M = 0.005  # a ray that ends so little before a point on a surface has reached it
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from proxcgal.core.typing import Array
 from proxcgal.scene.solids import Box, Cylinder, Solid, Sphere
+from proxcgal.sim.clouds import Points
 
 Schema = dict[str, Any]
 
@@ -68,16 +69,19 @@ _ENTITY = _object(
 _PRIMITIVES = ("arrows", "cubes", "spheres", "cylinders", *_OTHER_PRIMITIVES)
 _DELETION = _object("foxglove.SceneEntityDeletion", timestamp=_TIME, type=_WHOLE, id=_TEXT)
 
+_POINT_CLOUD = _object(
+    "foxglove.PointCloud", timestamp=_TIME, frame_id=_TEXT, pose=_POSE, point_stride=_WHOLE,
+    fields=_list(_FIELD), data=_BYTES,
+)  # fmt: skip
+
 #: Schema of each topic beside the ticks.
 TOPICS: dict[str, Schema] = {
-    "/cloud": _object(
-        "foxglove.PointCloud", timestamp=_TIME, frame_id=_TEXT, pose=_POSE, point_stride=_WHOLE,
-        fields=_list(_FIELD), data=_BYTES,
-    ),
+    "/cloud": _POINT_CLOUD,
     "/links": _object("foxglove.FrameTransforms", transforms=_list(_TRANSFORM)),
     "/scene": _object(
         "foxglove.SceneUpdate", deletions=_list(_DELETION), entities=_list(_ENTITY)
     ),
+    "/removed": _POINT_CLOUD,
 }  # fmt: skip
 
 
@@ -86,14 +90,19 @@ def nanoseconds(time: float) -> int:
     return min(max(round(time * _NANO), 0), 2**64 - 1) if math.isfinite(time) else 0
 
 
-def point_cloud(time: float, points_W: Array) -> bytes:
-    """foxglove.PointCloud of (n, 3) points."""
+def point_cloud(time: float, points_W: Points) -> bytes:
+    """foxglove.PointCloud of (n, 3) points [m]."""
     data = np.ascontiguousarray(points_W, "<f4").tobytes()
     fields = [{"name": n, "offset": 4 * i, "type": _FLOAT32} for i, n in enumerate("xyz")]
     return _json(
         timestamp=_time(time), frame_id=WORLD, pose=_pose(np.eye(4)), point_stride=12,
         fields=fields, data=base64.b64encode(data).decode(),
     )  # fmt: skip
+
+
+def points_of(message: bytes) -> Points:
+    """(n, 3) the points of a `point_cloud` [m]."""
+    return np.frombuffer(base64.b64decode(json.loads(message)["data"]), "<f4").reshape(-1, 3)
 
 
 def frame_transforms(time: float, names: Sequence[str], poses_W: Array) -> bytes:
@@ -109,7 +118,9 @@ def frame_transforms(time: float, names: Sequence[str], poses_W: Array) -> bytes
     return _json(transforms=transforms)
 
 
-def pair_arrow(time: float, tail_W: Sequence[float] | None, tip_W: Sequence[float] | None) -> bytes:
+def arrow_update(
+    time: float, tail_W: Sequence[float] | None, tip_W: Sequence[float] | None
+) -> bytes:
     """foxglove.SceneUpdate: the closest pair as an arrow; without one, the last arrow goes."""
     if tail_W is None or tip_W is None:
         gone = {"timestamp": _time(time), "type": 0, "id": "closest_pair"}

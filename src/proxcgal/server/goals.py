@@ -103,7 +103,7 @@ def goal_pose(goal: JointGoal, T_WE: Array) -> Array:
     turn = None if goal.rpy is None else transforms.rotation(goal.rpy)  # (4.2)
     if goal.frame == END_EFFECTOR:
         T_WT[:3, :3] = T_WE[:3, :3] if turn is None else T_WE[:3, :3] @ turn  # (4.4)
-        T_WT[:3, 3] = T_WE[:3, 3] + T_WE[:3, :3] @ np.asarray(goal.translation)  # (4.6), mended
+        T_WT[:3, 3] = T_WE[:3, 3] + T_WE[:3, :3] @ np.asarray(goal.translation)  # (4.6), corrected
     else:
         T_WT[:3, :3] = T_WE[:3, :3] if turn is None else turn  # (4.3)
         T_WT[:3, 3] = goal.translation  # (4.5)
@@ -141,7 +141,7 @@ def reach_problem(reach: tuple[Array, float], T_WT: Array) -> str | None:
     )
 
 
-def _told(values: object) -> str:
+def _short_text(values: object) -> str:
     try:
         return str(values)[:80]
     except ValueError:  # Python does not write integers of so many digits
@@ -151,13 +151,13 @@ def _told(values: object) -> str:
 def _three(name: str, values: object) -> str | None:
     """Why these are not three finite numbers; None where they are."""
     try:
-        if not isinstance(values, Sequence | np.ndarray) or isinstance(values, str):
-            raise TypeError
-        if len(values) != 3:
-            raise TypeError
-        if any(isinstance(value, bool | str) for value in values):
+        if (
+            not isinstance(values, Sequence | np.ndarray)
+            or len(values) != 3
+            or any(isinstance(value, bool | str) for value in values)
+        ):
             raise TypeError
         finite = all(math.isfinite(value) for value in values)
     except (TypeError, OverflowError):
-        return f"{name} = {_told(values)}: must be three finite numbers"
+        return f"{name} = {_short_text(values)}: must be three finite numbers"
     return None if finite else f"{name} = {list(values)}: must be finite"

@@ -1,25 +1,17 @@
-"""Where the simulated sensors really sit, and the look at the arm itself before a run."""
+"""Where the simulated sensors really sit: injected mount faults."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from proxcgal import _core
-from proxcgal.core.errors import ConfigError
 from proxcgal.core.typing import Array
-from proxcgal.models.mount_check import MountChecks, check_mounts
 from proxcgal.models.self_view import rotation_by
 from proxcgal.scenario.keys import MOUNT_FAULTS, Fault
 from proxcgal.sim.faults import rows_of, value_of
 
-if TYPE_CHECKING:
-    from proxcgal.scenario.setup import Setup
-    from proxcgal.sim.source import SimulatedSource
-
-SCANS = 30  #: of each sensor before a run: 2 s at 15 Hz
 _STREAM = 3  # of the seed; noise and other faults draw from others
 
 
@@ -54,22 +46,3 @@ class RealMounts:
             if fault.start <= time and (fault.end is None or time < fault.end):
                 T_LS[row] = T_LS[row] @ T_SS
         return T_LS
-
-
-def look(setup: Setup, source: SimulatedSource) -> MountChecks:
-    """What the sensors' view of the arm at its start says of their mounts."""
-    return check_mounts(setup.robot, setup.skin, setup.q0, source.standing(SCANS))
-
-
-def require_mounts(setup: Setup, source: SimulatedSource) -> MountChecks:
-    """The same. Raises: ConfigError: mounts that are wrong, one line each."""
-    checks = look(setup, source)
-    if not checks:
-        name = setup.scenario.name
-        lines = [f"scenario {name}: skin: {check}" for check in checks.wrong]
-        raise ConfigError(
-            "\n".join(lines) + f"\nscenario {name}: sensors do not sit where the skin says, by "
-            "what they see of the arm itself; mend their mounts, or leave the check out with "
-            "skin.check_mounts=false"
-        )
-    return checks

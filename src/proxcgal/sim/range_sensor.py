@@ -30,7 +30,7 @@ class RangeModel:
         self._sensor = sensor
         self._sensors = sensors
         self._seed = seed
-        self._drawn: dict[int, tuple[Array, Array, Array]] = {}
+        self._index, self._drawn = -1, (np.empty(0),) * 3  # draws of the scan made last
         self._sub_rays = simulation.sub_rays
         rays = _directions(sensor.field_of_view, self._sub_rays)
         length = np.linalg.norm(rays, axis=1)
@@ -81,16 +81,12 @@ class RangeModel:
         return of_rays.reshape(len(of_rays), ZONES, self._sub_rays)
 
     def _draws(self, index: int) -> tuple[Array, Array, Array]:
-        if index not in self._drawn:
+        if index != self._index:  # scans come in order: one index at a time is enough
             generator = np.random.default_rng([self._seed, _STREAM, index])
             shape = (self._sensors, ZONES)
-            self._drawn.clear()  # scans come in order: one index at a time is enough
-            self._drawn[index] = (
-                generator.standard_normal(shape),
-                generator.random(shape),
-                generator.random(shape),
-            )
-        return self._drawn[index]
+            noise, lost = generator.standard_normal(shape), generator.random(shape)
+            self._index, self._drawn = index, (noise, lost, generator.random(shape))
+        return self._drawn
 
 
 def _directions(field_of_view: float, sub_rays: int) -> Array:

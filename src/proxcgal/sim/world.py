@@ -3,8 +3,9 @@
 MuJoCo casts the rays at the scene; at the robot's own links, with their tens of thousands of faces,
 our trees cast them four times faster, with the same hits (tested).
 
-The only module that knows MuJoCo. Nothing is stepped: the arm follows its velocity commands
-exactly and the scene its paths, so poses are set, and rays and pictures are taken at them.
+Beside `physics` the only module that imports MuJoCo. Nothing is stepped: the arm follows its
+velocity commands exactly and the scene its paths, so poses are set, and rays and pictures are taken
+at them.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import os
 import sys
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -23,7 +24,9 @@ from numpy.typing import NDArray
 
 from proxcgal.core.errors import SimulationError
 from proxcgal.core.typing import Array, Bools
+from proxcgal.models.robots import Robot
 from proxcgal.models.surfaces import Surfaces
+from proxcgal.scene.obstacles import Scene
 from proxcgal.scene.solids import Box, Capsule, Cylinder, Solid, Sphere
 
 
@@ -43,10 +46,6 @@ if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get(
 
 _TOO_LATE = "mujoco" in sys.modules
 import mujoco  # noqa: E402
-
-if TYPE_CHECKING:
-    from proxcgal.models.robots import Robot
-    from proxcgal.scene.obstacles import Scene
 
 Color = tuple[float, float, float, float]
 
@@ -244,8 +243,8 @@ class World:
         if any(numbers) and not self._warnings:
             self._warnings.append(f"warning counters {numbers}")
         if self._warnings:
-            told, self._warnings[:] = "; ".join(self._warnings), []
-            raise SimulationError(f"MuJoCo warned: {told}")
+            found, self._warnings[:] = "; ".join(self._warnings), []
+            raise SimulationError(f"MuJoCo warned: {found}")
 
     def _shape(self, solids: Sequence[Solid]) -> None:
         """Gives the compiled solids their sizes, and all that MuJoCo derives of them."""

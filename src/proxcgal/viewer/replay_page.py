@@ -166,9 +166,10 @@ def _words(moment: Moment) -> str:
 
 
 def said(recorded: Replayed, again: Replayed | None) -> str:
-    """Is the recording repeated bit for bit, and what was computed beside it?"""
+    """Is it shown as recorded or computed again, and what was computed beside it?"""
     if recorded.same is None:
-        text = "holds ticks with scans only: shown as recorded, without clouds"
+        text = f"{recorded.ticks} ticks, shown as recorded"
+        text += "" if recorded.clouds else ", without clouds"
     elif recorded.same == recorded.ticks:
         text = (
             f"recomputed with its own settings: all {recorded.ticks} answers are those recorded, "

@@ -13,8 +13,8 @@ from proxcgal.models import Robot
 from proxcgal.models.mesh.display import display_meshes
 from proxcgal.scenario.setup import Setup
 from proxcgal.scene.solids import Capsule, Solid
-from proxcgal.trial.walkthrough.grip import HAND
 from proxcgal.trial.walkthrough.interactive import WalkTrial
+from proxcgal.trial.walkthrough.interactive_hand import HAND
 
 OPERATOR = "operator"  #: the capsule that rides on the tool
 

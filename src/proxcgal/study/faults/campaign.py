@@ -13,9 +13,7 @@ from proxcgal.evaluation.metrics import Summary
 from proxcgal.scenario.keys import FAULT_VALUES
 from proxcgal.scenario.loading import load_scenario
 from proxcgal.scenario.setup import Setup
-from proxcgal.sim.mount_faults import look
-from proxcgal.sim.source import SimulatedSource
-from proxcgal.sim.world import World
+from proxcgal.sim.assembly import Assembly
 from proxcgal.study.campaign import Campaign, Trial, plain
 from proxcgal.study.faults.cases import ROW_OF, ROWS, TICK_MS, Fault, Row
 from proxcgal.study.faults.figures import figures
@@ -114,8 +112,7 @@ def _refuse_short(base: Scenario) -> None:
 
 def _visible(setup: Setup) -> list[tuple[int, str]]:
     """Sensors and directions in which a wrong mount can be found at the scene's start."""
-    source = SimulatedSource(setup, World(setup.robot, setup.scene), seed=0)
-    checks = look(setup, source).sensors
+    checks = Assembly.of(setup, "wb", seed=0).mount_checks().sensors
     return [(check.sensor, axis) for check in checks for axis in check.visible]
 
 
@@ -182,8 +179,8 @@ def perform(trial: Trial, report: Report) -> Numbers:
 def _refused(trial: Trial, report: Report) -> Numbers:
     """Is that very sensor found before the run, and no other?"""
     setup = Setup.of(trial.scenario, robot_of(trial.scenario, trial.robot_digest))
-    source = SimulatedSource(setup, World(setup.robot, setup.scene), trial.seed)
-    wrong = [check.sensor for check in look(setup, source).wrong]
+    checks = Assembly.of(setup, trial.controller, trial.seed).mount_checks()
+    wrong = [check.sensor for check in checks.wrong]
     report(1.0)
     found = wrong == [fault.sensor for fault in trial.scenario.faults]
     return {

@@ -99,7 +99,7 @@ def _summary(scenario: Scenario, logs: Sequence[TrialLog]) -> Summary:
     """What `summary.json` says, with what belongs to the kind of scene alone."""
     from proxcgal.evaluation.phases import mean_distances
     from proxcgal.scenario.loading import HriScenario
-    from proxcgal.trial.walkthrough.guided import GuidedScenario, off_paths
+    from proxcgal.trial.walkthrough.guided_source import GuidedScenario, off_paths
 
     summary = static_summary(logs)
     if isinstance(scenario, HriScenario):
@@ -140,10 +140,7 @@ def check(
     """
     from proxcgal.scenario.setup import Setup
     from proxcgal.scenario.walkthrough import WalkScenario
-    from proxcgal.sim.faults import FaultInjector
-    from proxcgal.sim.mount_faults import require_mounts
-    from proxcgal.sim.source import SimulatedSource
-    from proxcgal.sim.world import World
+    from proxcgal.trial.assembly import assemble
     from proxcgal.trial.walkthrough.setup import WalkSetup
 
     if isinstance(scenario, WalkScenario):
@@ -151,12 +148,10 @@ def check(
         return
     announce(f"setting up {scenario.name} (a robot's first time takes a while)", quiet=quiet)
     setup = Setup.of(scenario, robot)
-    for controller in controllers:
-        setup.make_controller(controller)
-    FaultInjector(scenario.faults, [mount.name for mount in setup.skin.mounts], scenario.seed)
-    if scenario.skin.check_mounts and not all(map(setup.uses_known_points, controllers)):
-        source = SimulatedSource(setup, World(setup.robot, setup.scene), scenario.seed)
-        checks = require_mounts(setup, source)
+    runs = [assemble(setup, controller) for controller in controllers]
+    sensed = next((run for run in runs if run.world is not None), None)
+    checks = None if sensed is None else sensed.require_mounts()
+    if checks is not None:
         announce(
             f"{scenario.name}: {checks.judged} of {len(checks.sensors)} sensors see enough of the "
             "arm itself for their mounts to be judged; none is wrong",

@@ -34,13 +34,13 @@ def run_walkthrough(
     from proxcgal.study.walkthrough.ratings import read_ratings
     from proxcgal.trial.walkthrough.run import run_walk
     from proxcgal.trial.walkthrough.setup import WalkSetup
-    from proxcgal.trial.walkthrough.teach import check_duration
+    from proxcgal.trial.walkthrough.teaching import check_duration
 
     ratings = read_ratings(Path(scenario.ratings)) if scenario.ratings else {}
     announce(f"setting up {scenario.name}", quiet=quiet)
     setup = WalkSetup.of(scenario)
     check_duration(scenario)  # before the files of an older run are removed
-    told = setup.told()
+    told = setup.notes()
     print("\n".join(told))
     made = ready([folder])
     for name in (RECORDING, FIGURE, TABLE, TRAJECTORY, RATINGS):
@@ -67,7 +67,7 @@ def _write(
     from proxcgal.evaluation.metrics import write_json, write_text
     from proxcgal.study.figures import png
     from proxcgal.study.walkthrough.figures import teach_figure, trip_figure
-    from proxcgal.trial.walkthrough.taught import to_csv, to_trajectory
+    from proxcgal.trial.walkthrough.taught_path import to_csv, to_trajectory
 
     scenario = setup.scenario
     title = f"{scenario.name}: {setup.robot.name}, seed {scenario.seed}"
@@ -154,7 +154,7 @@ def _cut(trip: dict[str, Any]) -> str:
 
 def _unfinished(how: str, taught: dict[str, Any]) -> list[str]:
     """Says where a teaching without a trip did not come to its path's end."""
-    from proxcgal.trial.walkthrough.teach import REACHED
+    from proxcgal.trial.walkthrough.teaching import REACHED
 
     left = taught.get("left_m")
     if left is None or left <= REACHED:

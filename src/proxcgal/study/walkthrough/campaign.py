@@ -19,8 +19,8 @@ from proxcgal.study.trials import robot_of
 from proxcgal.study.walkthrough.draws import OWN, WISHES, draw_walk
 from proxcgal.trial.walkthrough.playback import play
 from proxcgal.trial.walkthrough.setup import WalkSetup
-from proxcgal.trial.walkthrough.taught import clean
-from proxcgal.trial.walkthrough.teach import teach
+from proxcgal.trial.walkthrough.taught_path import clean_path
+from proxcgal.trial.walkthrough.teaching import teach
 
 if TYPE_CHECKING:
     from proxcgal.study.jobs import Report
@@ -97,7 +97,7 @@ def perform(trial: Trial, report: Report) -> Row:
     }
     if tripped is None:
         keys = setup.scenario.playback
-        path = clean(setup.robot, log.time, log.q, step=keys.step, tolerance=keys.tolerance)
+        path = clean_path(setup.robot, log.time, log.q, step=keys.step, tolerance=keys.tolerance)
         played = play(setup, path)
         row["playback_rms_m"] = float(np.sqrt((played.error_m**2).mean()))
         row["playback_max_m"] = float(played.error_m.max())

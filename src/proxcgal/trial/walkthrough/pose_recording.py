@@ -1,13 +1,11 @@
-"""The durable record of what was taught: every pose, readable after `kill -9`.
+"""The durable record of a teaching: every pose, readable after `kill -9`.
 
-An MCAP file without chunks, flushed after every pose; each holds its own checksum, and reading
-gives all up to the first damage.
+Each pose holds its own checksum, and reading gives all up to the first damage.
 """
 
 from __future__ import annotations
 
 import json
-import warnings
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,16 +15,14 @@ import numpy as np
 from mcap.exceptions import McapError
 from mcap.records import Message, Metadata
 from mcap.stream_reader import StreamReader
-from mcap.writer import CompressionType, IndexType, Writer
 
-from proxcgal.core.closing import Closing
-from proxcgal.core.errors import ConfigError, RecordingError
-from proxcgal.core.typing import Array, Bools
+from proxcgal.core.errors import RecordingError
+from proxcgal.core.typing import Array
 from proxcgal.core.versions import versions
 from proxcgal.recording.foxglove import nanoseconds
+from proxcgal.recording.mcap_file import SETTINGS, McapFile
 
-PROFILE = "proxcgal"
-TOPIC, SETTINGS = "/pose", "proxcgal"
+TOPIC = "/pose"
 _SCHEMA = {
     "type": "object",
     "title": "proxcgal.TaughtPose",
@@ -35,39 +31,26 @@ _SCHEMA = {
 }
 
 
-class PoseRecorder(Closing):
-    """Writes one teaching. A full disk stops the recording, with a warning, but never the run."""
+class PoseRecorder(McapFile):
+    """Writes one teaching."""
 
     def __init__(self, path: str | Path, about: Mapping[str, str]) -> None:
         """Opens the file and writes what it is of.
 
         Args:
             path: of the file.
-            about: kept beside the poses: the scenario, the seed.
+            about: metadata beside the poses: the scenario, the seed.
 
         Raises:
             ConfigError: it cannot be written.
         """
-        self.path = Path(path)
-        self.failure: str | None = None  #: why it stopped early
-        self._count = 0
+        super().__init__(path)
         try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._stream = self.path.open("wb")
-            self._writer = Writer(
-                self._stream, use_chunking=False, compression=CompressionType.NONE,
-                index_types=IndexType.ALL, enable_data_crcs=True,
-            )  # fmt: skip
-            self._writer.start(PROFILE, "proxcgal teaching")
-            schema = self._writer.register_schema(
-                _SCHEMA["title"], "jsonschema", json.dumps(_SCHEMA).encode()
-            )
-            self._channel = self._writer.register_channel(TOPIC, "json", schema)
-            self._writer.add_metadata(SETTINGS, {**about, "versions": json.dumps(versions())})
-            self._stream.flush()
+            settings = {**about, "versions": json.dumps(versions())}
+            self.begin("proxcgal teaching", {TOPIC: _SCHEMA}, settings)
+            self.flush()
         except OSError as error:
-            reason = error.strerror or error
-            raise ConfigError(f"recording {self.path}: cannot be written: {reason}") from None
+            raise self.unwritable(error) from None
 
     def write(
         self, time: float, q: Array, tool_W: Array, tool_R: Array, force: Array, torque: bool
@@ -82,47 +65,23 @@ class PoseRecorder(Closing):
             },
             separators=(",", ":"),
         ).encode()[:-1]  # fmt: skip
-        data = body + b',"crc":%d}' % zlib.crc32(body)
-        stamp = nanoseconds(time)
-        try:
-            self._writer.add_message(self._channel, stamp, data, stamp, self._count)
-            self._stream.flush()
-            self._count += 1
-        except OSError as error:
-            self._fail(error)
-
-    def close(self) -> None:
-        """Writes the index and closes the file."""
-        try:
-            if self.failure is None:
-                self._writer.finish()  # type: ignore[no-untyped-call]
-            self._stream.close()
-        except OSError as error:
-            self._fail(error)
-
-    def _fail(self, error: OSError) -> None:
-        if self.failure is not None:
-            return
-        self.failure = f"recording {self.path} stopped: {error.strerror}"
-        warnings.warn(self.failure, RuntimeWarning, stacklevel=4)
+        with self.guarded():
+            self.message(TOPIC, nanoseconds(time), body + b',"crc":%d}' % zlib.crc32(body))
+            self.flush()
 
 
 @dataclass(frozen=True, eq=False)
-class TaughtPoses:
+class RecordedPoses:
     """What a file holds."""
 
     path: Path
     about: Mapping[str, str]
     time: Array  #: (n,) [s]
     q: Array  #: (n, n_q) [rad]
-    position_W: Array  #: (n, 3) [m] of the tool
-    rotation_WT: Array  #: (n, 3, 3)
-    force: Array  #: (n, 6) [N], [N m]
-    torque: Bools  #: (n,)
     damage: str | None  #: why reading ended early; None for a whole file
 
 
-def read_poses(path: str | Path) -> TaughtPoses:
+def read_poses(path: str | Path) -> RecordedPoses:
     """Reads all poses up to the first damage.
 
     Raises:
@@ -149,14 +108,8 @@ def read_poses(path: str | Path) -> TaughtPoses:
             f"recording {path}: holds no poses of a teaching" + (f": {damage}" if damage else "")
         )
 
-    def column(name: str) -> Array:
-        return np.array([row[name] for row in rows], np.float64)
-
-    return TaughtPoses(
-        path, about, column("time"), column("q"), column("position"),
-        column("rotation").reshape(-1, 3, 3), column("force"),
-        np.array([row["torque"] for row in rows], np.bool_), damage,
-    )  # fmt: skip
+    time, q = (np.array([row[name] for row in rows], np.float64) for name in ("time", "q"))
+    return RecordedPoses(path, about, time, q, damage)
 
 
 def _row(message: Message, number: int) -> dict[str, object]:

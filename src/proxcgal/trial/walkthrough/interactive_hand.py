@@ -1,4 +1,4 @@
-"""A hand at the tool that somebody moves while the arm runs; it pulls as every hand here does."""
+"""A hand at the tool that a user moves while the arm runs; it pulls as the operator's does."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from proxcgal.core.typing import Array
 from proxcgal.scenario.walkthrough import Hand as HandKeys
-from proxcgal.trial.walkthrough.hand import Pull
+from proxcgal.trial.walkthrough.operator_hand import HandImpedance
 
 HAND = "hand at the tool"  #: its name, beside those of solids
 SPEED = 2.0  #: [m/s] at most: above what a guard lets an arm do
@@ -14,27 +14,17 @@ ACCELERATION = 10.0  #: [m/s^2] at most: a hand that is dragged by leaps pulls w
 _STIFFNESS = 10.0  # [rad/s] by which it goes where it is wanted, critically damped
 
 
-class Grip:
-    """Holds the tool once it is told where to go, until it lets go or the arm stops."""
+class InteractiveHand:
+    """Holds the tool from its first `move` until it lets go or the arm stops."""
 
     def __init__(self, keys: HandKeys, period: float) -> None:
         """Args: `keys` of its spring and damper; one step takes `period` [s]."""
         self._keys = keys
         self._period = period
-        self._pull = Pull(keys, period)
-        self._pose: Array | None = None
+        self._pull = HandImpedance(keys, period)
+        self.pose: Array | None = None  #: (4, 4) T_W of the hand; None where it holds nothing
         self._wanted = np.eye(4)
         self._twist = np.zeros(6)
-
-    @property
-    def holds(self) -> bool:
-        """Does it hold the tool?"""
-        return self._pose is not None
-
-    @property
-    def pose(self) -> Array | None:
-        """(4, 4) T_W of the hand; None where it holds nothing."""
-        return self._pose
 
     def move(self, tool: Array, wanted: Array) -> None:
         """Takes the tool, where it does not hold it yet, and says where the hand is to go.
@@ -43,15 +33,15 @@ class Grip:
             tool: (4, 4) T_WT where the tool is.
             wanted: (4, 4) of the hand; it turns at once, and goes there at bounded speed.
         """
-        if self._pose is None:
-            self._pose = np.array(tool)
-            self._pull = Pull(self._keys, self._period)
+        if self.pose is None:
+            self.pose = np.array(tool)
+            self._pull = HandImpedance(self._keys, self._period)
             self._twist[:] = 0.0
         self._wanted = np.array(wanted)
 
     def let_go(self) -> None:
         """Pulls no more."""
-        self._pose = None
+        self.pose = None
 
     def force(self, position: Array, rotation: Array, twist: Array) -> Array:
         """One step: what it does at the tool's origin (6,), in world [N], [N m].
@@ -61,11 +51,11 @@ class Grip:
             rotation: (3, 3) R_WT.
             twist: (6,) of the tool, linear first [m/s], [rad/s].
         """
-        if self._pose is None:
+        if self.pose is None:
             return np.zeros(6)
-        self._advance(self._pose)
+        self._advance(self.pose)
         return self._pull.force(
-            (position, rotation, twist), self._pose[:3, 3], self._pose[:3, :3], self._twist
+            (position, rotation, twist), self.pose[:3, 3], self.pose[:3, :3], self._twist
         )
 
     def _advance(self, pose: Array) -> None:

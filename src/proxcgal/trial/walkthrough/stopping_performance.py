@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from proxcgal.sim.physics import Physics
-from proxcgal.trial.walkthrough.log import WalkLog
 from proxcgal.trial.walkthrough.setup import PERIOD, WalkSetup
-from proxcgal.trial.walkthrough.teach import teach
+from proxcgal.trial.walkthrough.teaching import teach
 
 BRAKE_SCALES = (0.7, 1.0, 1.3)
 WORST_SPEED, WORST_PAYLOAD = 1.30, 5.0  # [m/s] of the tool, downwards; [kg]
@@ -22,8 +21,8 @@ _WATCHED = 3.0  # [s] after the torque is cut
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Stop:
-    """One stop."""
+class StoppingPerformance:
+    """Time and distance of one stop."""
 
     case: str
     brake_scale: float  #: of the arm's own brakes' torques
@@ -31,7 +30,7 @@ class Stop:
     stop_distance_m: float
 
 
-def stops_of(setup: WalkSetup, seed: int) -> list[Stop]:
+def stops_with_other_brakes(setup: WalkSetup, seed: int) -> list[StoppingPerformance]:
     """The scenario's own stop with brakes 30 % weaker, as they are and 30 % stronger."""
     stops = []
     for scale in BRAKE_SCALES:
@@ -41,35 +40,41 @@ def stops_of(setup: WalkSetup, seed: int) -> list[Stop]:
         other = replace(setup, scenario=setup.scenario.model_copy(update={"arm": arm}))
         log = teach(other, seed=seed)
         if log.trips:
-            stops.append(_stop("as run", arm.brake_scale, log))
+            time, distance = log.stop_time_s() or 0.0, log.stop_distance_m() or 0.0
+            stops.append(
+                StoppingPerformance(
+                    case="as run", brake_scale=arm.brake_scale, stop_time_s=time,
+                    stop_distance_m=distance,
+                )
+            )  # fmt: skip
     return stops
 
 
-def worst_stops(setup: WalkSetup) -> list[Stop]:
+def worst_case_stops(setup: WalkSetup) -> list[StoppingPerformance]:
     """Stretched level, 5 kg more on the gun, 1.30 m/s downwards, with the same brakes.
 
-    None where `not_worst` tells why.
+    None where there is a `worst_case_problem`.
     """
-    return [] if not_worst(setup) else [_worst(setup, scale) for scale in BRAKE_SCALES]
+    return [] if worst_case_problem(setup) else [_worst(setup, scale) for scale in BRAKE_SCALES]
 
 
-def not_worst(setup: WalkSetup) -> str | None:
+def worst_case_problem(setup: WalkSetup) -> str | None:
     """Why an arm is not looked at in the worst posture, which is that of `ga_ol`; None: it is."""
     robot, q = setup.robot, np.array(STRETCHED)
-    told = f"worst posture left out: that of ga_ol does not fit {robot.name}: "
+    text = f"worst posture left out: that of ga_ol does not fit {robot.name}: "
     if robot.n_q != len(q):
-        return told + f"{robot.n_q} joints, not {len(q)}"
+        return text + f"{robot.n_q} joints, not {len(q)}"
     outside = np.flatnonzero((q < robot.q_min) | (q > robot.q_max))
     if len(outside):
         names = ", ".join(robot.joint_names[row] for row in outside)
-        return told + f"it is beyond the limits of {names}"
+        return text + f"it is beyond the limits of {names}"
     way_W = np.asarray(robot.tool_jacobian(q))[:3, _SINKING]
     if -way_W[2] < _DOWN * np.linalg.norm(way_W) or not way_W.any():
-        return told + f"{robot.joint_names[_SINKING]} does not bring the tool down there"
+        return text + f"{robot.joint_names[_SINKING]} does not bring the tool down there"
     return None
 
 
-def _worst(setup: WalkSetup, scale: float) -> Stop:
+def _worst(setup: WalkSetup, scale: float) -> StoppingPerformance:
     robot, q = setup.robot, np.array(STRETCHED)
     lever = np.linalg.norm(robot.tool_jacobian(q)[:3, _SINKING])
     speed = WORST_SPEED / lever
@@ -91,15 +96,8 @@ def _worst(setup: WalkSetup, scale: float) -> Stop:
         physics.step(command, False)
     moving = np.flatnonzero(np.abs(qd).max(axis=1) > setup.scenario.guard.rest_speed)
     last = int(moving[-1]) + 1 if len(moving) else 0
-    return Stop(
+    return StoppingPerformance(
         case="worst posture", brake_scale=brakes,
         stop_time_s=last * PERIOD if last < watched else float("inf"),
         stop_distance_m=float(np.linalg.norm(np.diff(tool, axis=0), axis=1).sum()),
-    )  # fmt: skip
-
-
-def _stop(case: str, scale: float, log: WalkLog) -> Stop:
-    return Stop(
-        case=case, brake_scale=scale, stop_time_s=log.stop_time_s() or 0.0,
-        stop_distance_m=log.stop_distance_m() or 0.0,
     )  # fmt: skip

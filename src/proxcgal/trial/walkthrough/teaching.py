@@ -8,11 +8,11 @@ import numpy as np
 
 from proxcgal.core.errors import ConfigError
 from proxcgal.scenario.walkthrough import WalkScenario
-from proxcgal.trial.walkthrough.cell import Cell
-from proxcgal.trial.walkthrough.hand import Hand
+from proxcgal.trial.walkthrough.guarded_arm import GuardedArm
 from proxcgal.trial.walkthrough.intended_path import IntendedPath
 from proxcgal.trial.walkthrough.log import WalkLog
-from proxcgal.trial.walkthrough.poses import PoseRecorder
+from proxcgal.trial.walkthrough.operator_hand import OperatorHand
+from proxcgal.trial.walkthrough.pose_recording import PoseRecorder
 from proxcgal.trial.walkthrough.setup import PERIOD, WalkSetup
 
 RESET_AT, ENGAGE_AT, START_AT = 0.05, 0.10, 0.50  # [s] the button, the switch, the signal to start
@@ -22,7 +22,7 @@ REACHED = 0.02  # [m] of the tool from where the path ends: farther, it was not 
 
 
 def check_duration(scenario: WalkScenario) -> None:
-    """Is there time for the wished path, also under the hand-guiding rules?
+    """Is there time for the intended path, also under the hand-guiding rules?
 
     Raises:
         ConfigError: it takes longer than `duration`.
@@ -52,18 +52,18 @@ def teach(
         seed: fixes the operator's tremor.
         recorder: gets every pose; the caller closes it.
         with_truth: ask the simulator too, in every cycle, what the guard should find.
-        on_progress: told the share that is done, 0 to 1, every 0.1 s simulated.
+        on_progress: gets the share that is done, 0 to 1, every 0.1 s simulated.
 
     Raises:
         ConfigError: a guard that contradicts itself.
         SimulationError: MuJoCo warned.
     """
     scenario = setup.scenario
-    cell = Cell(setup)
-    physics, bounds = cell.physics, cell.bounds
-    wish = IntendedPath.of(scenario.legs, PERIOD)
+    arm = GuardedArm(setup)
+    physics, bounds = arm.physics, arm.bounds
+    path = IntendedPath.of(scenario.legs, PERIOD)
     start = np.array(setup.robot.tool_pose(setup.q0))
-    hand = Hand(scenario.hand, wish, start, PERIOD, seed)
+    hand = OperatorHand(scenario.hand, path, start, PERIOD, seed)
     begin = round(START_AT / PERIOD)
     release = begin + hand.cycles + round(SETTLE / PERIOD)
     cycles = min(release + round(SETTLE / PERIOD), round(scenario.duration / PERIOD))
@@ -72,7 +72,7 @@ def teach(
     last = cycles
     for k in range(cycles):
         time = k * PERIOD
-        out = cell.watch(time, time >= RESET_AT)
+        out = arm.watch(time, time >= RESET_AT)
         truth = physics.truth(setup.monitored_pairs, setup.monitored_ends) if with_truth else None
         engaged = time >= ENGAGE_AT and k < release
         if engaged:
@@ -86,7 +86,7 @@ def teach(
             recorder.write(time, physics.q, physics.tool_W, physics.tool_R, force, out.torque)
         if out.trips and last == cycles:
             last = min(k + round(AFTER_STOP / PERIOD), cycles)
-        cell.move(force, engaged)
+        arm.move(force, engaged)
         if on_progress is not None and k % 100 == 0:
             on_progress(k / cycles)
         if k >= last:
@@ -94,5 +94,5 @@ def teach(
     if on_progress is not None:
         on_progress(1.0)
     if not log.trips:
-        log.left_m = float(np.linalg.norm(start[:3, 3] + wish.position[-1] - physics.tool_W))
+        log.left_m = float(np.linalg.norm(start[:3, 3] + path.position[-1] - physics.tool_W))
     return log.cut()

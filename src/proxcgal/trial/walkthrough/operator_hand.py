@@ -15,7 +15,7 @@ _TONES = 6  # sinusoids of random frequency and phase that make a tremor
 _LETTING_GO = 0.10  # [s] in which a hand that has noticed the stop lets go
 
 
-class Pull:
+class HandImpedance:
     """Spring and damper between the tool and where a hand wants it, bounded.
 
     Once the arm has stopped it goes on for the reaction time, and then lets go.
@@ -25,14 +25,9 @@ class Pull:
         """Args: one step takes `period` [s]."""
         self._keys = keys
         self._period = period
-        self._delay = round(keys.reaction_time / period)
+        self.delay = round(keys.reaction_time / period)  #: steps of the reaction time
         self._stopped_for = 0
         self._force = np.zeros(6)
-
-    @property
-    def delay(self) -> int:
-        """Steps of the reaction time."""
-        return self._delay
 
     @property
     def gone(self) -> bool:
@@ -65,7 +60,7 @@ class Pull:
         force[3:] += keys.turn_damping * (twist[3:] - tool[2][3:])
         _bound(force[:3], keys.max_force)
         _bound(force[3:], keys.max_torque)
-        if self._stopped_for > self._delay:
+        if self._stopped_for > self.delay:
             force *= max(self._held(), 0.0)
         return force
 
@@ -75,26 +70,26 @@ class Pull:
 
     def _held(self) -> float:
         """Share of the force that a hand has left which notices a stop."""
-        return 1.0 - (self._stopped_for - self._delay) * self._period / _LETTING_GO
+        return 1.0 - (self._stopped_for - self.delay) * self._period / _LETTING_GO
 
 
-class Hand:
-    """Pulls the tool along a wished path; lets go once it has noticed that the arm has stopped."""
+class OperatorHand:
+    """Pulls the tool along an intended path; lets go of an arm that it feels has stopped."""
 
     def __init__(
-        self, keys: HandKeys, wish: IntendedPath, start: Array, period: float, seed: int
+        self, keys: HandKeys, path: IntendedPath, start: Array, period: float, seed: int
     ) -> None:
         """Args: `start` (4, 4) T_WT where the path begins; the seed fixes the tremor."""
-        self._pull = Pull(keys, period)
-        self._wish = wish
+        self._pull = HandImpedance(keys, period)
+        self._path = path
         self._start = np.array(start)
         self._twist = np.zeros(6)
-        self._tremor = _tremor(len(wish) + self._pull.delay, period, keys.tremor, seed)
+        self._tremor = _tremor(len(path) + self._pull.delay, period, keys.tremor, seed)
 
     @property
     def cycles(self) -> int:
         """From the signal to start until the path's end."""
-        return len(self._wish) + self._pull.delay
+        return len(self._path) + self._pull.delay
 
     def force(self, cycle: int, position: Array, rotation: Array, twist: Array) -> Array:
         """What it does at the tool's origin (6,), in world [N], [N m].
@@ -105,12 +100,12 @@ class Hand:
             rotation: (3, 3) R_WT.
             twist: (6,) of the tool, linear first [m/s], [rad/s].
         """
-        wish = self._wish
-        row = min(max(cycle - self._pull.delay, 0), len(wish) - 1)
-        self._twist[:3], self._twist[3:] = wish.velocity[row], wish.spin[row]
+        path = self._path
+        row = min(max(cycle - self._pull.delay, 0), len(path) - 1)
+        self._twist[:3], self._twist[3:] = path.velocity[row], path.spin[row]
         return self._pull.force(
-            (position, rotation, twist), self._start[:3, 3] + wish.position[row],
-            rotation_of(wish.turn[row]) @ self._start[:3, :3], self._twist,
+            (position, rotation, twist), self._start[:3, 3] + path.position[row],
+            rotation_of(path.turn[row]) @ self._start[:3, :3], self._twist,
             self._tremor[min(cycle, len(self._tremor) - 1)],
         )  # fmt: skip
 

@@ -53,7 +53,7 @@ class TaughtPath:
         return q, qd
 
 
-def clean(robot: Robot, time: Array, q: Array, *, step: float, tolerance: float) -> TaughtPath:
+def clean_path(robot: Robot, time: Array, q: Array, *, step: float, tolerance: float) -> TaughtPath:
     """The widest smoothing that moves the tool nowhere by more than the tolerance.
 
     Waiting at both ends is cut to 0.1 s; a Gaussian window runs over the joints' positions, ends

@@ -1,26 +1,24 @@
-"""A hand at the tool of an arm that its sensors keep away from what they see."""
+"""A source of tick inputs: a hand guides the arm that its sensors keep away from obstacles."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import numpy as np
 
 from proxcgal import _core
 from proxcgal.core.typing import Array
+from proxcgal.evaluation.trial_log import TrialLog
+from proxcgal.scenario.setup import Setup
 from proxcgal.scenario.walkthrough import GuidedScenario
 from proxcgal.sim.source import SimulatedSource
 from proxcgal.sim.tick import TickInput
-from proxcgal.trial.walkthrough.grip import Grip
-from proxcgal.trial.walkthrough.hand import Hand, rotation_of
+from proxcgal.sim.world import World
 from proxcgal.trial.walkthrough.intended_path import IntendedPath
-
-if TYPE_CHECKING:
-    from proxcgal.evaluation.trial_log import TrialLog
-    from proxcgal.scenario.setup import Setup
-    from proxcgal.sim.world import World
+from proxcgal.trial.walkthrough.interactive_hand import InteractiveHand
+from proxcgal.trial.walkthrough.operator_hand import OperatorHand, rotation_of
 
 __all__ = ["GuidedScenario", "GuidedSource", "off_path", "off_paths"]
 
@@ -38,15 +36,15 @@ class GuidedSource(SimulatedSource):
             _core.AdmittanceConfig(**scenario.admittance.model_dump())
         )
         self._pace = 1.0 / scenario.simulation.control_hz
-        wish = IntendedPath.of(scenario.legs, self._pace)
+        path = IntendedPath.of(scenario.legs, self._pace)
         start = np.array(setup.robot.tool_pose(setup.q0))
-        self._hand = Hand(scenario.hand, wish, start, self._pace, seed)
+        self._hand = OperatorHand(scenario.hand, path, start, self._pace, seed)
         self._cycle = 0
         self._twist = np.zeros(6)
         self._J = np.zeros((6, setup.robot.n_q))
         self._keys = scenario.hand
-        #: A hand that somebody moves, in place of the one with a path in mind.
-        self.grip: Grip | None = None
+        #: A hand that a user moves, in place of the simulated operator's.
+        self.user_hand: InteractiveHand | None = None
 
     def read(self) -> TickInput | None:
         """The next tick's inputs: the goal is one step of the hand ahead of the tool."""
@@ -56,10 +54,10 @@ class GuidedSource(SimulatedSource):
         T = np.array(self._robot.tool_pose(inputs.q))
         self._J = np.array(self._robot.tool_jacobian(inputs.q))
         tool = T[:3, 3], T[:3, :3], self._twist
-        if self.grip is None:
+        if self.user_hand is None:
             force, engaged = self._hand.force(self._cycle, *tool), True
         else:
-            force, engaged = self.grip.force(*tool), self.grip.holds
+            force, engaged = self.user_hand.force(*tool), self.user_hand.pose is not None
         wanted = np.array(self._admittance.step(force, engaged, self._pace))
         self._cycle += 1
         goal = T.copy()
@@ -67,11 +65,11 @@ class GuidedSource(SimulatedSource):
         goal[:3, :3] = rotation_of(wanted[3:] / self._gain) @ T[:3, :3]
         return replace(inputs, goal=goal)
 
-    def take_over(self) -> Grip:
-        """The hand that somebody moves from now on; it holds nothing yet."""
-        if self.grip is None:
-            self.grip = Grip(self._keys, self._pace)
-        return self.grip
+    def take_over(self) -> InteractiveHand:
+        """The hand that a user moves from now on; it holds nothing yet."""
+        if self.user_hand is None:
+            self.user_hand = InteractiveHand(self._keys, self._pace)
+        return self.user_hand
 
     def command(self, qd: Array) -> None:
         """Velocity until the next tick (n_q,); the hand feels what became of its pull."""
@@ -81,10 +79,9 @@ class GuidedSource(SimulatedSource):
 
 
 def off_path(scenario: GuidedScenario, log: TrialLog) -> Array:
-    """(n,) how far the tool is from the nearest point of the path that the hand wishes [m]."""
-    wish = IntendedPath.of(scenario.legs, 0.005)
-    path = log.tool_W[0] + wish.position
-    found: Array = np.array([np.linalg.norm(path - tool, axis=1).min() for tool in log.tool_W])
+    """(n,) how far the tool is from the nearest point of the path that the hand intends [m]."""
+    path_W = log.tool_W[0] + IntendedPath.of(scenario.legs, 0.005).position
+    found: Array = np.array([np.linalg.norm(path_W - tool, axis=1).min() for tool in log.tool_W])
     return found
 
 

@@ -1,4 +1,4 @@
-"""The cell of a walk-through, cycle by cycle: guard, hand guiding, an arm with its brakes."""
+"""The arm of a walk-through, cycle by cycle: guard, hand guiding, weight, drives and brakes."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from proxcgal.core.typing import Array
 from proxcgal.trial.walkthrough.setup import WalkSetup
 
 
-class Cell:
-    """One arm under its guard. A cycle is `watch`, then `move`."""
+class GuardedArm:
+    """One arm under its guard. A cycle is `watch`, then `move` or `drive`."""
 
-    def __init__(self, setup: WalkSetup) -> None:
-        """At the start, at rest, without torque."""
+    def __init__(self, setup: WalkSetup, q: Array | None = None) -> None:
+        """At rest, without torque, at `q` (n_q,) or at the start."""
         self.guard, self.guide = setup.make_guard(), setup.make_guide()
-        self.physics = setup.make_physics()
+        self.physics = setup.make_physics(q)
         self._subtract_human = setup.scenario.guard.subtract_human
         self._still = np.zeros(setup.robot.n_q)
         self._torque = False
@@ -49,3 +49,7 @@ class Cell:
         else:
             self.guide.halt()
         self.physics.step(command, self._torque, force)
+
+    def drive(self, command: Array) -> None:
+        """The arm follows a velocity (n_q,), where it has torque. Raises: SimulationError."""
+        self.physics.step(command, self._torque)
