@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from proxcgal.models.mesh.shapes import box, ellipsoid
 
 import proxcgal as px
-from proxcgal.models.mesh.files import box, ellipsoid
 
 
 @pytest.fixture(scope="module")

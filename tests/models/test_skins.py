@@ -5,9 +5,9 @@ from pathlib import Path
 import igl
 import numpy as np
 import pytest
+from proxcgal.models.mesh.shapes import cylinder
 
 import proxcgal as px
-from proxcgal.models.mesh.files import cylinder
 
 STANDOFF = 0.01
 RINGS = [

@@ -20,7 +20,7 @@ from proxcgal.evaluation.trial_log import final_ticks
 from proxcgal.recording.reader import Recorder, Recording, read_recording
 from proxcgal.recording.render import animate, recorded_moments
 from proxcgal.recording.replay import Replay, recorded_log
-from proxcgal.scenario.keys import INPUT_FAULTS, Fault
+from proxcgal.scenario.fault_keys import INPUT_FAULTS, Fault
 from proxcgal.scenario.loading import load_scenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.sim.faults import FaultInjector

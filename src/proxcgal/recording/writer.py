@@ -20,10 +20,10 @@ from mcap.writer import CompressionType, IndexType, Writer
 
 from proxcgal.core.closing import Closing
 from proxcgal.core.errors import ConfigError
+from proxcgal.core.provenance import versions
 from proxcgal.core.typing import Array
-from proxcgal.core.versions import versions
 from proxcgal.recording import codec, foxglove
-from proxcgal.scenario.loading import Scenario
+from proxcgal.scenario.scenario import Scenario
 from proxcgal.scene.obstacles import Scene
 from proxcgal.sim.tick import Tick
 

@@ -12,7 +12,7 @@ from proxcgal.core.modes import STOP
 from proxcgal.core.typing import Array
 from proxcgal.models import Robot
 from proxcgal.models.macro_micro import tool_jacobian
-from proxcgal.scenario.joint import JointScenario
+from proxcgal.scenario.joint_scenario import JointScenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.server.goals import AT_REST
 from proxcgal.sim.tick import Tick, TickInput, TickResult, TickTruth

@@ -14,9 +14,9 @@ from proxcgal.scenario.setup import make_robot
 from proxcgal.trial.trial import run_trial
 
 if TYPE_CHECKING:
+    from proxcgal.core.progress import OnProgress
     from proxcgal.models import Robot
-    from proxcgal.scenario.loading import Scenario
-    from proxcgal.study.jobs import Report
+    from proxcgal.scenario.scenario import Scenario
     from proxcgal.trial.trial import TrialLog
 
 _KEPT = 4  # robots, with all that is made of them once
@@ -27,7 +27,7 @@ def simulate(
     scenario: Scenario,
     controller: str,
     seed: int,
-    report: Report,
+    report: OnProgress,
     *,
     recording: Path | None = None,
     ticks: RecordedTicks = "all",

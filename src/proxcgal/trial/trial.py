@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from proxcgal import _core
+from proxcgal.core.progress import OnProgress
 from proxcgal.core.typing import Array, Bools
 from proxcgal.evaluation.coverage import coverage_of, sightings
 from proxcgal.evaluation.ground_truth import NOT_ASKED, GroundTruth
@@ -19,7 +20,7 @@ from proxcgal.evaluation.trial_log import TOO_CLOSE, TrialLog, final_ticks, samp
 from proxcgal.models import Robot
 from proxcgal.recording.replay import first_difference, recompute
 from proxcgal.recording.writer import Recorder, Settings
-from proxcgal.scenario.loading import CONTROLLERS, Scenario
+from proxcgal.scenario.scenario import CONTROLLERS, Scenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.sim.faults import FaultInjector
 from proxcgal.sim.loop import run_ticks
@@ -31,8 +32,6 @@ from proxcgal.trial.walkthrough.guided import GuidedScenario, GuidedSource
 
 __all__ = ["CONTROLLERS", "TrialLog", "first_difference", "recompute", "run_trial"]
 
-Progress = Callable[[float], None]
-
 
 def run_trial(
     scenario: Scenario,
@@ -41,7 +40,7 @@ def run_trial(
     seed: int | None = None,
     robot: Robot | None = None,
     recorder: Recorder | None = None,
-    on_progress: Progress | None = None,
+    on_progress: OnProgress | None = None,
     sparse_truth: bool = False,
     without_truth: bool = False,
     coverage: bool = False,

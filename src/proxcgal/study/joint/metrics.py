@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from proxcgal.core.files import NOTHING_M
 from proxcgal.core.modes import HOLD
 from proxcgal.core.typing import Array
 from proxcgal.evaluation.ground_truth import GroundTruth
-from proxcgal.evaluation.metrics import NOTHING_M
 from proxcgal.models import macro_micro
 
 if TYPE_CHECKING:
     from proxcgal.models import Robot
-    from proxcgal.scenario.loading import Scenario
+    from proxcgal.scenario.scenario import Scenario
     from proxcgal.study.store import Row
     from proxcgal.trial.trial import TrialLog
 

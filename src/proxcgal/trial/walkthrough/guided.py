@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from proxcgal import _core
+from proxcgal.core.transforms import rotation_from_vector
 from proxcgal.core.typing import Array
-from proxcgal.scenario.walkthrough import GuidedScenario
+from proxcgal.scenario.walkthrough_scenario import GuidedScenario
 from proxcgal.sim.source import SimulatedSource
 from proxcgal.sim.tick import TickInput
 from proxcgal.trial.walkthrough.grip import Grip
-from proxcgal.trial.walkthrough.hand import Hand, rotation_of
+from proxcgal.trial.walkthrough.hand import Hand
 from proxcgal.trial.walkthrough.intended_path import IntendedPath
 
 if TYPE_CHECKING:
@@ -64,7 +65,7 @@ class GuidedSource(SimulatedSource):
         self._cycle += 1
         goal = T.copy()
         goal[:3, 3] += wanted[:3] / self._gain
-        goal[:3, :3] = rotation_of(wanted[3:] / self._gain) @ T[:3, :3]
+        goal[:3, :3] = rotation_from_vector(wanted[3:] / self._gain) @ T[:3, :3]
         return replace(inputs, goal=goal)
 
     def take_over(self) -> Grip:

@@ -21,8 +21,8 @@ from mcap.writer import CompressionType, IndexType, Writer
 
 from proxcgal.core.closing import Closing
 from proxcgal.core.errors import ConfigError, RecordingError
+from proxcgal.core.provenance import versions
 from proxcgal.core.typing import Array, Bools
-from proxcgal.core.versions import versions
 from proxcgal.recording.foxglove import nanoseconds
 
 PROFILE = "proxcgal"
