@@ -9,8 +9,9 @@ from scipy.stats import chi2
 
 import proxcgal as px
 from proxcgal.models import mount_check
-from proxcgal.scenario.keys import Fault
-from proxcgal.scenario.loading import Scenario, load_scenario
+from proxcgal.scenario.fault_keys import Fault
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.scenario.scenario import Scenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.sim.assembly import MOUNT_CHECK_SCANS
 from proxcgal.sim.mount_faults import RealMounts

@@ -12,10 +12,11 @@ from mcap.reader import make_reader
 from mcap.records import Message
 
 import proxcgal as px
-from proxcgal.core.transforms import rotation
-from proxcgal.core.versions import versions
+from proxcgal.core.provenance import versions
+from proxcgal.core.transforms import rotation_from_rpy
 from proxcgal.recording import codec, foxglove
-from proxcgal.recording.reader import Recorder, Recording, Settings, read_recording
+from proxcgal.recording.reader import Recording, Settings, read_recording
+from proxcgal.recording.writer import Recorder
 from proxcgal.scenario.loading import load_scenario
 from proxcgal.sim.clouds import Clouds
 from proxcgal.sim.tick import Found, TaskResult, Tick, TickInput, TickResult, TickTruth
@@ -186,7 +187,7 @@ def test_arrow_points_from_the_robot_to_the_obstacle() -> None:
 @pytest.mark.parametrize("rpy", [(0, 0, 0), (3.1, 0, 0), (0, 3.1, 0), (0, 0, 3.1), (1, -1, 2)])
 def test_link_frames_keep_their_orientation(rpy: tuple[float, float, float]) -> None:
     T = np.eye(4)
-    T[:3, :3] = rotation(rpy)
+    T[:3, :3] = rotation_from_rpy(rpy)
     content = json.loads(foxglove.frame_transforms(0.0, ["a"], T[None]))
     x, y, z, w = (content["transforms"][0]["rotation"][name] for name in "xyzw")
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])

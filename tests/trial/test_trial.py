@@ -16,11 +16,12 @@ from mcap.writer import Writer
 from PIL import Image
 
 import proxcgal as px
-from proxcgal.evaluation.trial_log import final_ticks
-from proxcgal.recording.reader import Recorder, Recording, read_recording
+from proxcgal.evaluation.trial_log import TrialLog, final_ticks
+from proxcgal.recording.reader import Recording, read_recording
 from proxcgal.recording.render import draw, recorded_moments, write_gif
-from proxcgal.recording.replay import Replay, recorded_log
-from proxcgal.scenario.keys import INPUT_FAULTS, Fault
+from proxcgal.recording.replay import Replay, first_difference, recompute, recorded_log
+from proxcgal.recording.writer import Recorder
+from proxcgal.scenario.fault_keys import INPUT_FAULTS, Fault
 from proxcgal.scenario.loading import load_scenario
 from proxcgal.scenario.setup import Setup, make_robot
 from proxcgal.sim.faults import FaultInjector
@@ -30,7 +31,7 @@ from proxcgal.sim.world import World
 from proxcgal.study.campaign_picture import _draw
 from proxcgal.study.runs.results import warn_of_stopped
 from proxcgal.study.trials import simulate
-from proxcgal.trial.trial import TrialLog, first_difference, recompute, run_trial
+from proxcgal.trial.trial import run_trial
 
 SHORT = ["duration=1.0"]
 NAMES = [f"s{row}" for row in range(4)]

@@ -22,7 +22,8 @@ from documented import rows_of
 from proxcgal.core.errors import ConfigError, RecordingError, SimulationError
 from proxcgal.models.builtin import ga_ol
 from proxcgal.scenario.loading import load_scenario, parse_scenario
-from proxcgal.scenario.walkthrough import GuidedScenario, Leg, WalkScenario
+from proxcgal.scenario.walkthrough_keys import LegKeys
+from proxcgal.scenario.walkthrough_scenario import GuidedScenario, WalkScenario
 from proxcgal.sim.physics import Physics
 from proxcgal.study.figures import GREY
 from proxcgal.study.runs.walkthrough import lines_of
@@ -252,8 +253,8 @@ def test_a_file_that_holds_no_teaching_is_refused(tmp_path: Path) -> None:
 
 def test_wished_legs_go_from_rest_to_rest_and_no_faster_than_said() -> None:
     legs = (
-        Leg(to=(0.0, 1.0, 0.0), speed=0.8, ramp=0.4),
-        Leg(to=(0.0, 1.0, 0.0), turn=(0.0, 0.5, 0.0), speed=0.8, turn_speed=0.3),
+        LegKeys(to=(0.0, 1.0, 0.0), speed=0.8, ramp=0.4),
+        LegKeys(to=(0.0, 1.0, 0.0), turn=(0.0, 0.5, 0.0), speed=0.8, turn_speed=0.3),
     )
     wish = IntendedPath.of(legs, PERIOD)
     assert np.linalg.norm(wish.velocity, axis=1).max() == pytest.approx(0.8)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from proxcgal.scenario.loading import load_scenario
-from proxcgal.scenario.walkthrough import WalkScenario
+from proxcgal.scenario.walkthrough_scenario import WalkScenario
 from proxcgal.sim.moment import Moment
 from proxcgal.trial.interactive import LiveTrial
 from proxcgal.trial.walkthrough.interactive import WalkTrial

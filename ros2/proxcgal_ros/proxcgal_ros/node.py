@@ -19,9 +19,10 @@ from visualization_msgs.msg import MarkerArray
 
 from proxcgal.core.errors import ConfigError
 from proxcgal.core.modes import HOLD, NAMES, STOP
-from proxcgal.models import check_mounts
+from proxcgal.models.mount_check import check_mounts
 from proxcgal.recording.writer import Recorder, Settings
-from proxcgal.scenario.loading import CONTROLLERS, change_scenario, load_scenario
+from proxcgal.scenario.loading import change_scenario, load_scenario
+from proxcgal.scenario.scenario import CONTROLLERS
 from proxcgal.scenario.setup import Setup
 from proxcgal.sim.assembly import MOUNT_CHECK_SCANS
 from proxcgal.sim.loop import run_ticks

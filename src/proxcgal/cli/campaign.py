@@ -118,9 +118,9 @@ class CampaignOptions:
 
 def campaign_command(options: CampaignOptions, command: str) -> int:
     """Runs what is unfinished; prints tables, what was kept, what failed, the report's path."""
+    from proxcgal.core.files import write_bytes, write_json, write_text
     from proxcgal.core.progress import announce
     from proxcgal.core.provenance import origin
-    from proxcgal.evaluation.metrics import write_bytes, write_json, write_text
     from proxcgal.report.report import write_report
     from proxcgal.study.campaign_picture import show_moving
     from proxcgal.study.figures import png
@@ -212,7 +212,7 @@ def _kept(options: CampaignOptions) -> int:
 
 def _packages() -> dict[str, str]:
     """What a trial's numbers depend on: those of other versions are not put beside them."""
-    from proxcgal.core.versions import versions
+    from proxcgal.core.provenance import versions
 
     return {name: v for name, v in versions().items() if name not in ("python", "machine")}
 
@@ -232,7 +232,7 @@ def _perform(
     campaign: Campaign, store: Store, pool: Pool, folder: Path, quiet: bool
 ) -> list[Ended]:
     """Runs the unfinished trials under a progress bar."""
-    from proxcgal.core.progress import Progress, announce
+    from proxcgal.core.progress import ProgressBar, announce
     from proxcgal.study.campaign import run_campaign, unfinished
 
     todo = unfinished(campaign, store)
@@ -241,7 +241,7 @@ def _perform(
         announce(f"{there} of {len(campaign.trials)} trials are there already", quiet=quiet)
     ended = there
     sizes = [trial.scenario.duration for trial in todo]
-    with Progress("simulating", sizes, "s", quiet=quiet) as progress:
+    with ProgressBar("simulating", sizes, "s", quiet=quiet) as progress:
 
         def done(trial: Trial, outcome: Outcome) -> None:
             nonlocal ended

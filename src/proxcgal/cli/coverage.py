@@ -49,10 +49,11 @@ def coverage_command(options: CoverageOptions, command: str) -> int:
     import numpy as np
 
     from proxcgal.core.errors import ConfigError
-    from proxcgal.core.progress import Progress, announce
+    from proxcgal.core.files import finite, write_bytes, write_json
+    from proxcgal.core.progress import ProgressBar, announce
     from proxcgal.evaluation.blind_volume import REACH_M, blind_volume
     from proxcgal.evaluation.ground_truth import GroundTruth
-    from proxcgal.evaluation.metrics import coverage_lines, finite, write_bytes, write_json
+    from proxcgal.evaluation.metrics import coverage_lines
     from proxcgal.scenario.loading import load_scenario
     from proxcgal.scenario.setup import Setup
     from proxcgal.study.coverage_figure import coverage_figure
@@ -75,7 +76,7 @@ def coverage_command(options: CoverageOptions, command: str) -> int:
     setup = Setup.of(scenario)
     folder = options.out or Path("out") / "coverage"
     ready([folder])
-    with Progress("simulating", [scenario.duration], "s", quiet=options.quiet) as progress:
+    with ProgressBar("simulating", [scenario.duration], "s", quiet=options.quiet) as progress:
         log = run_trial(
             scenario, options.controller, robot=setup.robot, sparse_truth=True, coverage=True,
             on_progress=lambda share: progress.shares([share]),

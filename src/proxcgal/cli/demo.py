@@ -42,7 +42,8 @@ def demo_command(options: DemoOptions, command: str) -> int:
     from proxcgal.cli.run import conclude
     from proxcgal.core.provenance import origin
     from proxcgal.report.report import write_report
-    from proxcgal.scenario.loading import USUAL, load_scenario
+    from proxcgal.scenario.loading import load_scenario
+    from proxcgal.scenario.scenario import USUAL
     from proxcgal.study.runs.results import Plan, check, combine, perform, ready
 
     workers = checked_workers(options.workers)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from proxcgal.evaluation.metrics import Summary
-    from proxcgal.scenario.loading import Scenario
+    from proxcgal.scenario.scenario import Scenario
 
 
 @dataclass(frozen=True)
@@ -81,8 +81,9 @@ def run_command(options: RunOptions, command: str) -> int:
     from proxcgal.core.errors import ConfigError
     from proxcgal.core.provenance import origin
     from proxcgal.report.report import write_report
-    from proxcgal.scenario.joint import JointScenario
-    from proxcgal.scenario.loading import HriScenario, load_scenario
+    from proxcgal.scenario.hri_scenario import HriScenario
+    from proxcgal.scenario.joint_scenario import JointScenario
+    from proxcgal.scenario.loading import load_scenario
     from proxcgal.study.runs.joint import run_joint
     from proxcgal.study.runs.results import Plan, check, perform
 
@@ -135,7 +136,7 @@ def run_command(options: RunOptions, command: str) -> int:
 def _run_walkthrough(scenario: Scenario, options: RunOptions, command: str) -> int:
     """A walk-through has no controllers to choose from, and one process does it."""
     from proxcgal.core.provenance import origin
-    from proxcgal.scenario.walkthrough import WalkScenario
+    from proxcgal.scenario.walkthrough_scenario import WalkScenario
     from proxcgal.study.runs.walkthrough import run_walkthrough
 
     assert isinstance(scenario, WalkScenario)

@@ -14,7 +14,7 @@ from proxcgal.core.errors import ConfigError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from proxcgal.scenario.loading import Scenario
+    from proxcgal.scenario.scenario import Scenario
     from proxcgal.study.timing.grid import Cell, Effort
     from proxcgal.study.timing.inputs import Inputs
 
@@ -52,8 +52,8 @@ class SweepOptions:
 
 def sweep_command(options: SweepOptions, command: str) -> int:
     """Measures, writes, prints the table; the report's path is the last line."""
+    from proxcgal.core.files import as_json, write_bytes
     from proxcgal.core.provenance import machine, origin
-    from proxcgal.evaluation.metrics import as_json, write_bytes
     from proxcgal.report.report import write_report
     from proxcgal.scenario.loading import load_scenario
     from proxcgal.study.runs.results import ready, remove_empty
@@ -89,12 +89,12 @@ def _prepare(
     scenarios: Sequence[Scenario], vertices: Sequence[int], clouds: Sequence[str], quiet: bool
 ) -> list[list[Inputs]]:
     """All inputs, robot by robot, before anything is written: what does not fit is told first."""
-    from proxcgal.core.progress import Progress
+    from proxcgal.core.progress import ProgressBar
     from proxcgal.study.timing.inputs import grid_inputs
 
     grids: list[list[Inputs]] = []
     count = len(vertices) * len(clouds)
-    with Progress("preparing", [1.0] * (len(scenarios) * count), "", quiet=quiet) as progress:
+    with ProgressBar("preparing", [1.0] * (len(scenarios) * count), "", quiet=quiet) as progress:
         for scenario in scenarios:
             grid: list[Inputs] = []
             for inputs in grid_inputs(scenario, vertices, clouds):
@@ -111,12 +111,12 @@ def _prepare(
 
 def _measure(grids: Sequence[Sequence[Inputs]], effort: Effort, quiet: bool) -> list[Cell]:
     """One cell after the other, in this process and nothing beside it."""
-    from proxcgal.core.progress import Progress
+    from proxcgal.core.progress import ProgressBar
     from proxcgal.study.timing.grid import time_cells
 
     everything = [inputs for grid in grids for inputs in grid]
     cells: list[Cell] = []
-    with Progress("measuring", [1.0] * len(everything), "", quiet=quiet) as progress:
+    with ProgressBar("measuring", [1.0] * len(everything), "", quiet=quiet) as progress:
         for row, inputs in enumerate(everything, 1):
             found = list(time_cells([inputs], effort))
             cells += found

@@ -15,7 +15,7 @@ from proxcgal.cli.options import ControllerName, Settings, flat
 from proxcgal.core.errors import ConfigError
 
 if TYPE_CHECKING:
-    from proxcgal.scenario.loading import Scenario
+    from proxcgal.scenario.scenario import Scenario
     from proxcgal.viewer.live_page import LivePage
 
 LOCAL = "127.0.0.1"
@@ -83,7 +83,7 @@ def _check(scenario: Scenario, controller: str | None) -> None:
     Raises:
         ConfigError: what does not.
     """
-    from proxcgal.scenario.walkthrough import WalkScenario
+    from proxcgal.scenario.walkthrough_scenario import WalkScenario
     from proxcgal.study.runs.results import check
     from proxcgal.trial.walkthrough.setup import WalkSetup
 

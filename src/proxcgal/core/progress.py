@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from proxcgal.core.closing import Closing
 
+#: Called with the share that is done, 0 to 1.
+OnProgress = Callable[[float], None]
 
-class Progress(Closing):
+
+class ProgressBar(Closing):
     """Share of several pieces of work done, on stderr.
 
     A bar on a terminal; in a log (CI) a line per finished piece; nothing when quiet.

@@ -12,7 +12,7 @@ from proxcgal.core.errors import ConfigError
 from proxcgal.core.transforms import inverse, placed
 from proxcgal.core.typing import Array
 from proxcgal.evaluation.visibility import Visibility
-from proxcgal.models import Robot
+from proxcgal.models.robots import Robot
 from proxcgal.scenario.setup import Setup
 
 REACH_M = 0.5  #: [m] from the arm's surface: what is farther is not counted

@@ -7,8 +7,9 @@ from typing import Literal
 
 import numpy as np
 
+from proxcgal.core.transforms import pose_errors
 from proxcgal.core.typing import Array
-from proxcgal.scenario.joint import Finish
+from proxcgal.scenario.goal_keys import FinishKeys
 
 Outcome = Literal["succeeded", "aborted", "cancelled"]
 
@@ -53,7 +54,7 @@ class Ending:
 class GoalWatch:
     """Is the goal reached, or has nothing come nearer to it for a while?"""
 
-    def __init__(self, finish: Finish, goal: Array) -> None:
+    def __init__(self, finish: FinishKeys, goal: Array) -> None:
         """Args: `goal` is T_WT (4, 4)."""
         self._finish = finish
         self._goal = goal
@@ -74,10 +75,3 @@ class GoalWatch:
         if time - self._since > finish.patience:
             return Ending("aborted", f"no progress for {finish.patience:g} s")
         return None
-
-
-def pose_errors(T_WT: Array, goal: Array) -> tuple[float, float]:
-    """Distance [m] and angle [rad] between two poses; accurate near 0 too."""
-    chord = np.linalg.norm(goal[:3, :3] - T_WT[:3, :3]) / np.sqrt(8.0)
-    angle = 2.0 * np.arcsin(min(float(chord), 1.0))
-    return float(np.linalg.norm(goal[:3, 3] - T_WT[:3, 3])), float(angle)

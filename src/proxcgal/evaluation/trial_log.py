@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from proxcgal.core.typing import Array, Bools
 from proxcgal.evaluation.coverage import NO_COVERAGE, Coverage, Sighting
 from proxcgal.evaluation.termination import Ending
-from proxcgal.models import Robot
+from proxcgal.models.robots import Robot
 from proxcgal.sim.tick import TaskResult, Tick, TickResult
 
 NOTHING = 9.99  #: [m] stands for the distance to nothing

@@ -10,7 +10,7 @@ import numpy as np
 from proxcgal import _core
 from proxcgal.core.errors import ConfigError, GeometryError, ModelError
 from proxcgal.core.typing import Array, Ints
-from proxcgal.models.mesh.files import FARTHEST
+from proxcgal.models.formats.safe_xml import FARTHEST
 from proxcgal.models.mesh.triangles import is_number
 from proxcgal.models.robots import Robot
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from proxcgal import _core
 from proxcgal.core.cache import Cache, Stored
-from proxcgal.core.transforms import inverse
+from proxcgal.core.transforms import inverse, placed
 from proxcgal.core.typing import Array, Bools
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ class Surfaces:
         for pose in poses:
             T_AB = inverse(pose[a]) @ pose[b]
             if len(probes_B):
-                probes_A = probes_B @ T_AB[:3, :3].T + T_AB[:3, 3]
+                probes_A = placed(T_AB, probes_B)
                 if self.trees[a].closest(probes_A)[0].min() < ALWAYS_NEAR:
                     continue
             distance, _, near_B = self.trees[a].distance(self.trees[b], T_AB, ALWAYS_NEAR)

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from proxcgal.core.transforms import axes_along, quaternion
 from proxcgal.core.typing import Array
 from proxcgal.scene.solids import Box, Cylinder, Solid, Sphere
 from proxcgal.sim.clouds import Points
@@ -128,8 +129,9 @@ def arrow_update(
     tail, along = np.array(tail_W), np.array(tip_W) - np.array(tail_W)
     length = float(np.linalg.norm(along))
     head = min(0.03, 0.4 * length)
+    R = axes_along(along, (1.0, 0.0, 0.0)).T  # an arrow of Foxglove lies along x
     arrow = {
-        "pose": {"position": _vector(tail), "orientation": _turn_x_to(along)},
+        "pose": {"position": _vector(tail), "orientation": _quaternion(R)},
         "shaft_length": length - head, "shaft_diameter": 0.012, "head_length": head,
         "head_diameter": 0.03, "color": dict(zip("rgba", (0.85, 0.1, 0.1, 1.0), strict=True)),
     }  # fmt: skip
@@ -190,25 +192,4 @@ def _pose(T: Array) -> dict[str, dict[str, float]]:
 
 
 def _quaternion(R: Array) -> dict[str, float]:
-    """Shepperd's method: divides by the largest of the four components."""
-    trace = float(np.trace(R))
-    squares = [R[0, 0], R[1, 1], R[2, 2], trace]
-    k = int(np.argmax(squares))
-    if k == 3:
-        q = [R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1], 1.0 + trace]
-    else:
-        i, j = (k + 1) % 3, (k + 2) % 3
-        q = [0.0] * 4
-        q[k] = 1.0 - trace + 2.0 * R[k, k]
-        q[i], q[j], q[3] = R[i, k] + R[k, i], R[j, k] + R[k, j], R[j, i] - R[i, j]
-    unit = np.array(q) / np.linalg.norm(q)
-    return {name: float(value) for name, value in zip("xyzw", unit, strict=True)}
-
-
-def _turn_x_to(direction: Array) -> dict[str, float]:
-    """The rotation that brings the x axis, Foxglove's arrow, to a direction."""
-    length = np.linalg.norm(direction)
-    x = direction / length if length > 0.0 else np.array([1.0, 0.0, 0.0])
-    y = np.cross(np.eye(3)[np.argmin(np.abs(x))], x)
-    y /= np.linalg.norm(y)
-    return _quaternion(np.column_stack([x, y, np.cross(x, y)]))
+    return {name: float(value) for name, value in zip("xyzw", quaternion(R), strict=True)}

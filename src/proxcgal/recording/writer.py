@@ -16,11 +16,11 @@ from typing import Literal
 
 import numpy as np
 
+from proxcgal.core.provenance import versions
 from proxcgal.core.typing import Array
-from proxcgal.core.versions import versions
 from proxcgal.recording import codec, foxglove
 from proxcgal.recording.mcap_file import McapFile
-from proxcgal.scenario.loading import Scenario
+from proxcgal.scenario.scenario import Scenario
 from proxcgal.scene.obstacles import Scene
 from proxcgal.sim.clouds import Clouds
 from proxcgal.sim.tick import Tick

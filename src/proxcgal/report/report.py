@@ -8,7 +8,7 @@ from typing import Annotated
 
 import tyro
 
-from proxcgal.evaluation.metrics import write_text
+from proxcgal.core.files import write_text
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from html import escape
 
-from proxcgal.evaluation.metrics import COVERAGE_KEYS, SELF_LIMIT_M, shown
+from proxcgal.core.tables import in_metres
+from proxcgal.evaluation.metrics import COVERAGE_KEYS, SELF_LIMIT_M
 from proxcgal.report.document import (
     PICTURE_BYTES,
     REPLAY_BYTES,
@@ -101,7 +102,7 @@ def _pictures(run: Run) -> Iterator[tuple[str, str]]:
                 for controller in MOVING
                 if controller in run.summary.controllers
             }
-            told = [f"{c} {shown(value)} m" for c, value in least.items() if value is not None]
+            told = [f"{c} {in_metres(value)} m" for c, value in least.items() if value is not None]
             start = "The arm in motion" + (f"; least true distance: {', '.join(told)}" * bool(told))
             yield name, f"{start}. {caption}"
         else:
@@ -164,7 +165,7 @@ def _phases(run: Run) -> Iterator[str]:
         yield f'<tr><td class="left">{escape(NAMES.get(name, name))}</td>'
         for phase in phases:
             means = numbers.mean_m.get(phase, {})
-            yield f"<td>{shown(means.get('true'))}</td><td>{shown(means.get('seen'))}</td>"
+            yield f"<td>{in_metres(means.get('true'))}</td><td>{in_metres(means.get('seen'))}</td>"
         yield "</tr>"
     yield "</tbody></table></div>"
 
@@ -199,7 +200,7 @@ def _table(runs: Sequence[Run]) -> Iterator[str]:
                 numbers.seen_min_m,
                 numbers.goal_error_m,
             ):
-                yield f"<td>{shown(value)}</td>"
+                yield f"<td>{in_metres(value)}</td>"
             yield f"<td>{'-' if numbers.violations is None else numbers.violations}</td>"
             if row == 0:
                 gain = run.summary.gain_mm
@@ -218,14 +219,15 @@ def _verdict(runs: Sequence[Run]) -> Iterator[str]:
             yield (
                 f"<p>In <b>{escape(run.summary.scenario)}</b> the whole-body law ends "
                 f"{abs(gain):.0f} mm {more} the obstacle than the sensor-point baseline, truly: "
-                f"{shown(ends['wb'].true_final_m)} m against {shown(ends['sm'].true_final_m)} m."
+                f"{in_metres(ends['wb'].true_final_m)} m against "
+                f"{in_metres(ends['sm'].true_final_m)} m."
                 "</p>"
             )
         own = run.summary.self_min_m
         if run.summary.failed:
             yield (
                 f'<p class="bad">{escape(run.summary.scenario)}: failed: the arm came within '
-                f"{shown(own)} m of itself, allowed is {SELF_LIMIT_M} m.</p>"
+                f"{in_metres(own)} m of itself, allowed is {SELF_LIMIT_M} m.</p>"
             )
     yield (
         '<p class="soft">Reaching the goal is not asked for: keeping the distance comes first. '
@@ -277,7 +279,7 @@ def _trials(run: Run) -> Iterator[str]:
         yield (
             f'<tr><td class="left">{escape(name)}</td><td>{trial.tick_median_us:.0f}</td>'
             f"<td>{trial.tick_p99_us:.0f}</td><td>{trial.wall_s:.1f}</td>"
-            f"<td>{shown(numbers.self_min_m)}</td>"
+            f"<td>{in_metres(numbers.self_min_m)}</td>"
             f'<td class="text">{escape(found) or "none"}</td></tr>'
         )
     yield "</tbody></table></div>"

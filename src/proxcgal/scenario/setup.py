@@ -11,11 +11,13 @@ import numpy as np
 from proxcgal import _core
 from proxcgal.core import transforms
 from proxcgal.core.errors import ConfigError
+from proxcgal.core.schema import Section
 from proxcgal.core.typing import Array
-from proxcgal.models import Robot, load_robot, macro_micro, ring_skin
-from proxcgal.scenario.controller import Controller
-from proxcgal.scenario.keys import Section
-from proxcgal.scenario.loading import CONTROLLERS, Scenario
+from proxcgal.models import macro_micro
+from proxcgal.models.robots import Robot, load_robot
+from proxcgal.models.skins import ring_skin
+from proxcgal.scenario.controller_keys import ControllerKeys
+from proxcgal.scenario.scenario import CONTROLLERS, Scenario
 from proxcgal.scene.obstacles import KnownCloud, Scene
 
 
@@ -212,12 +214,12 @@ def _goals(scenario: Scenario, robot: Robot, q0: Array) -> tuple[Array, ...]:
         T_WT = start.copy()
         T_WT[:3, 3] = place
         if goal.rpy is not None:
-            T_WT[:3, :3] = transforms.rotation(goal.rpy)
+            T_WT[:3, :3] = transforms.rotation_from_rpy(goal.rpy)
         goals.append(T_WT)
     return tuple(goals)
 
 
-def _task(name: str, settings: Controller) -> Any:
+def _task(name: str, settings: ControllerKeys) -> Any:
     match name:
         case "manipulability":
             return _core.Manipulability(**_keys(settings.manipulability))

@@ -120,7 +120,7 @@ class Cylinder(_Sharp):
 
 
 @dataclass(frozen=True, slots=True)
-class Capsule:
+class CapsuleSolid:
     """All within `radius` of a segment of this length."""
 
     radius: float
@@ -182,18 +182,18 @@ class Sphere:
 
     def core(self) -> Mesh:
         """Its centre, a triangle 1 um wide."""
-        return Capsule(self.radius, 0.0).core()
+        return CapsuleSolid(self.radius, 0.0).core()
 
     def points(self, spacing: float) -> Array:
         """(n, 3) points of the surface, at most `spacing` apart along rings and meridians."""
-        return Capsule(self.radius, 0.0).points(spacing)
+        return CapsuleSolid(self.radius, 0.0).points(spacing)
 
     def nearest(self, point_O: Array) -> Array:
         """(3,) the point of the solid nearest to a point."""
-        return Capsule(self.radius, 0.0).nearest(point_O)
+        return CapsuleSolid(self.radius, 0.0).nearest(point_O)
 
 
-Solid = Box | Cylinder | Capsule | Sphere
+Solid = Box | Cylinder | CapsuleSolid | Sphere
 
 
 def _ticks(edge: float, spacing: float) -> Array:

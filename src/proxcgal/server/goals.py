@@ -16,7 +16,7 @@ from proxcgal.core import transforms
 from proxcgal.core.errors import ProxError
 from proxcgal.core.typing import Array
 from proxcgal.evaluation.termination import Outcome
-from proxcgal.models import Robot
+from proxcgal.models.robots import Robot
 from proxcgal.scenario.setup import posture_problems
 
 State = Literal["starting", "executing", "cancelling", "succeeded", "aborted", "cancelled"]
@@ -100,7 +100,7 @@ def goal_pose(goal: JointGoal, T_WE: Array) -> Array:
     Source: [JR] (4.2) to (4.6); (4.6) forgets to rotate, so here it is r_ee + R_ee r_goal.
     """
     T_WT = np.eye(4)
-    turn = None if goal.rpy is None else transforms.rotation(goal.rpy)  # (4.2)
+    turn = None if goal.rpy is None else transforms.rotation_from_rpy(goal.rpy)  # (4.2)
     if goal.frame == END_EFFECTOR:
         T_WT[:3, :3] = T_WE[:3, :3] if turn is None else T_WE[:3, :3] @ turn  # (4.4)
         T_WT[:3, 3] = T_WE[:3, 3] + T_WE[:3, :3] @ np.asarray(goal.translation)  # (4.6), corrected

@@ -9,9 +9,9 @@ import numpy as np
 
 from proxcgal.core.modes import STOP
 from proxcgal.core.typing import Array
-from proxcgal.models import Robot
 from proxcgal.models.macro_micro import tool_jacobian
-from proxcgal.scenario.joint import JointScenario
+from proxcgal.models.robots import Robot
+from proxcgal.scenario.joint_scenario import JointScenario
 from proxcgal.scenario.loading import change_scenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.server.goals import AT_REST

@@ -18,8 +18,8 @@ import numpy as np
 from proxcgal.core.closing import Closing
 from proxcgal.core.errors import ConfigError
 from proxcgal.core.typing import Array
-from proxcgal.models import Robot
-from proxcgal.scenario.joint import JointScenario
+from proxcgal.models.robots import Robot
+from proxcgal.scenario.joint_scenario import JointScenario
 from proxcgal.scenario.loading import load_scenario
 from proxcgal.server.goal_ledger import GoalLedger
 from proxcgal.server.goals import (

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from proxcgal import _core
+from proxcgal.core.transforms import rotation_from_vector
 from proxcgal.core.typing import Array
-from proxcgal.models.self_view import rotation_by
-from proxcgal.scenario.keys import MOUNT_FAULTS, Fault
+from proxcgal.scenario.fault_keys import MOUNT_FAULTS, Fault
 from proxcgal.sim.faults import rows_of, value_of
 
 _STREAM = 3  # of the seed; noise and other faults draw from others
@@ -34,7 +34,7 @@ class RealMounts:
                 if fault.kind == "mount_offset":
                     T_SS[:3, 3] = by
                 else:
-                    T_SS[:3, :3] = rotation_by(by)
+                    T_SS[:3, :3] = rotation_from_vector(by)
                 self._moved.append((fault, row, T_SS))
 
     def at(self, time: float) -> Array:

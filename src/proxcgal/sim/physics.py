@@ -17,7 +17,7 @@ import numpy as np
 from proxcgal.core.errors import ConfigError, SimulationError
 from proxcgal.core.typing import Array
 from proxcgal.models.formats.capsule_robot import CapsuleRobot
-from proxcgal.scenario.walkthrough import Human
+from proxcgal.scenario.walkthrough_keys import HumanKeys
 
 #: Stiff, so that a held arm does not creep: MuJoCo's own friction gives way by a hundredth of the
 #: load's acceleration, which would be 0.3 deg/s here.
@@ -50,7 +50,7 @@ class Physics:
         period: float = 0.001,
         payload: float = 0.0,
         brake_scale: float = 1.0,
-        human: Human | None = None,
+        human: HumanKeys | None = None,
     ) -> None:
         """The arm at rest, its brakes closed.
 
@@ -74,7 +74,7 @@ class Physics:
             )
         self._warnings: list[str] = []
         mujoco.set_mju_user_warning(self._warnings.append)
-        human = human or Human()
+        human = human or HumanKeys()
         self._human_offset = np.array(human.offset)
         self._model = _compile(robot, period, payload, human)
         self._data = mujoco.MjData(self._model)
@@ -229,7 +229,9 @@ def _cross(a: Array, b: Array) -> tuple[float, float, float]:
     )
 
 
-def _compile(robot: CapsuleRobot, period: float, payload: float, operator: Human) -> mujoco.MjModel:
+def _compile(
+    robot: CapsuleRobot, period: float, payload: float, operator: HumanKeys
+) -> mujoco.MjModel:
     spec = mujoco.MjSpec()
     spec.option.timestep = period
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER

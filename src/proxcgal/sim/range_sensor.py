@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from proxcgal import _core
 from proxcgal.core.typing import Array
-from proxcgal.scenario.keys import Sensor, Simulation
+from proxcgal.scenario.simulation_keys import SimulationKeys
+from proxcgal.scenario.skin_keys import SensorKeys
 
 ZONES = 64
 VALID, NO_TARGET, UNCERTAIN = 5, 255, (6, 9)
@@ -24,7 +25,9 @@ _STREAM = 1  # of the seed; faults draw from another
 class RangeModel:
     """The simulated sensors of one skin."""
 
-    def __init__(self, simulation: Simulation, sensor: Sensor, sensors: int, seed: int) -> None:
+    def __init__(
+        self, simulation: SimulationKeys, sensor: SensorKeys, sensors: int, seed: int
+    ) -> None:
         """Args: `sensors` is how many there are; the rest as in the scenario."""
         self._simulation = simulation
         self._sensor = sensor

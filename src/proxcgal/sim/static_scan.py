@@ -9,7 +9,7 @@ import numpy as np
 
 from proxcgal import _core
 from proxcgal.core.typing import Array, Bools
-from proxcgal.scenario.loading import Scenario
+from proxcgal.scenario.scenario import Scenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.sim.assembly import Assembly
 from proxcgal.sim.range_sensor import ZONES

@@ -27,7 +27,7 @@ from proxcgal.core.typing import Array, Bools
 from proxcgal.models.robots import Robot
 from proxcgal.models.surfaces import Surfaces
 from proxcgal.scene.obstacles import Scene
-from proxcgal.scene.solids import Box, Capsule, Cylinder, Solid, Sphere
+from proxcgal.scene.solids import Box, CapsuleSolid, Cylinder, Solid, Sphere
 
 
 def _off_screen_library() -> str:
@@ -55,7 +55,7 @@ _CAST_GROUP = np.array([1, 0, 0, 0, 0, 0], np.uint8)
 _GEOMS: dict[type[Solid], Any] = {
     Box: mujoco.mjtGeom.mjGEOM_BOX,
     Cylinder: mujoco.mjtGeom.mjGEOM_CYLINDER,
-    Capsule: mujoco.mjtGeom.mjGEOM_CAPSULE,
+    CapsuleSolid: mujoco.mjtGeom.mjGEOM_CAPSULE,
     Sphere: mujoco.mjtGeom.mjGEOM_SPHERE,
 }
 _LINK_COLORS = ((0.83, 0.84, 0.86, 1.0), (0.45, 0.62, 0.76, 1.0))

@@ -15,12 +15,13 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from proxcgal.core.errors import ConfigError, ProxError
-from proxcgal.study.jobs import Report, StoppedError
+from proxcgal.core.progress import OnProgress
+from proxcgal.study.jobs import StoppedError
 from proxcgal.study.store import Cell, Outcome, Row, Store
 from proxcgal.study.workers import Pool
 
 if TYPE_CHECKING:
-    from proxcgal.scenario.loading import Scenario
+    from proxcgal.scenario.scenario import Scenario
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,7 +61,7 @@ def plain(name: str) -> str:
     return re.sub(r"[^\w.-]|^\.", "_", name)
 
 
-Perform = Callable[[Trial, Report], Row]
+Perform = Callable[[Trial, OnProgress], Row]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -147,7 +148,7 @@ def run_campaign(
     return [Ended(trial=trial, outcome=outcomes[trial.key]) for trial in campaign.trials]
 
 
-def _attempt(perform: Perform, trial: Trial, report: Report) -> Outcome:
+def _attempt(perform: Perform, trial: Trial, report: OnProgress) -> Outcome:
     """One trial, in whichever process; what goes wrong becomes part of the outcome."""
     begin = clock.perf_counter()
     try:

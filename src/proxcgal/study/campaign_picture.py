@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from proxcgal.core.errors import ProxError
-from proxcgal.core.progress import Progress
+from proxcgal.core.progress import ProgressBar
 
 if TYPE_CHECKING:
+    from proxcgal.core.progress import OnProgress
     from proxcgal.study.campaign import Trial
-    from proxcgal.study.jobs import Report
     from proxcgal.study.workers import Pool
 
 MOVING, STILL = "motion.gif", "motion.png"
@@ -36,14 +36,14 @@ def show_moving(trials: Sequence[Trial], folder: Path, pool: Pool, *, quiet: boo
         shutil.rmtree(half, ignore_errors=True)
     if not trials or (folder / MOVING).is_file():
         return
-    with Progress("drawing", [1.0], "", quiet=quiet) as progress:
+    with ProgressBar("drawing", [1.0], "", quiet=quiet) as progress:
         pool.run(
             [functools.partial(_draw, list(trials), folder)],
             progress.shares, lambda _, text: progress.finished(text), lambda *_: "no picture",
         )  # fmt: skip
 
 
-def _draw(trials: Sequence[Trial], folder: Path, report: Report) -> str:
+def _draw(trials: Sequence[Trial], folder: Path, report: OnProgress) -> str:
     from proxcgal.recording.reader import read_recording
     from proxcgal.study.motion_picture import motion_picture
     from proxcgal.study.trials import simulate

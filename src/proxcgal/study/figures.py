@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from proxcgal.trial.trial import TrialLog
+    from proxcgal.evaluation.trial_log import TrialLog
 
 DPI = 160
 # Okabe and Ito's palette: told apart with any colour vision, and in print by lightness.

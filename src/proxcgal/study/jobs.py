@@ -14,8 +14,9 @@ from typing import Any
 
 import numpy as np
 
-Report = Callable[[float], None]  # called by a job with its share done, 0 to 1
-Job = Callable[[Report], Any]  # picklable; does the work
+from proxcgal.core.progress import OnProgress
+
+Job = Callable[[OnProgress], Any]  # picklable; does the work
 
 WATCH_S = 1.0  # [s] between looks at whether the master is alive
 _STOP_SLOT = 0
@@ -25,7 +26,7 @@ class StoppedError(Exception):
     """Raised inside a job that was told to stop."""
 
 
-class Progress:
+class SharedProgress:
     """Shares of all jobs done, and the word to stop, in a file that every process maps.
 
     A mapped file needs no server process and no queue, and costs a job nothing.
@@ -58,7 +59,7 @@ class Progress:
 
 def work(job: Job, path: str, row: int) -> Any:
     """One job in a worker process."""
-    progress = Progress(Path(path), 0)
+    progress = SharedProgress(Path(path), 0)
 
     def report(share: float) -> None:
         progress.report(row, share)

@@ -6,7 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from proxcgal.evaluation.metrics import Summary, aligned
+from proxcgal.core.tables import aligned
+from proxcgal.evaluation.metrics import Summary
 from proxcgal.study.campaign import Campaign, Trial
 
 if TYPE_CHECKING:

@@ -14,10 +14,10 @@ from proxcgal.scenario.setup import make_robot
 from proxcgal.trial.trial import run_trial
 
 if TYPE_CHECKING:
-    from proxcgal.models import Robot
-    from proxcgal.scenario.loading import Scenario
-    from proxcgal.study.jobs import Report
-    from proxcgal.trial.trial import TrialLog
+    from proxcgal.core.progress import OnProgress
+    from proxcgal.evaluation.trial_log import TrialLog
+    from proxcgal.models.robots import Robot
+    from proxcgal.scenario.scenario import Scenario
 
 _KEPT = 4  # robots, with all that is made of them once
 _robots: dict[Any, Robot] = {}
@@ -27,7 +27,7 @@ def simulate(
     scenario: Scenario,
     controller: str,
     seed: int,
-    report: Report,
+    report: OnProgress,
     *,
     recording: Path | None = None,
     ticks: RecordedTicks = "all",

@@ -23,7 +23,7 @@ from typing import Any
 from proxcgal.core.closing import Closing
 from proxcgal.core.errors import SimulationError
 from proxcgal.study.cluster import Cluster, work_far
-from proxcgal.study.jobs import Job, Progress, end_with, interrupts_blocked, work
+from proxcgal.study.jobs import Job, SharedProgress, end_with, interrupts_blocked, work
 
 POLL_S = 0.1  # [s] between looks at the progress
 
@@ -139,7 +139,7 @@ class _Run:
     ) -> None:
         self._jobs = jobs
         self._path = path
-        self._progress = Progress(path, len(jobs))
+        self._progress = SharedProgress(path, len(jobs))
         self._tell, self._done, self._lost = tell, done, lost
         self._running: dict[Future[Any], int] = {}
         self.results: list[Any] = [None] * len(jobs)

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from proxcgal.core.errors import RecordingError
-from proxcgal.core.progress import Progress
-from proxcgal.core.versions import versions
+from proxcgal.core.progress import OnProgress, ProgressBar
+from proxcgal.core.provenance import versions
 from proxcgal.study.campaign import told
-from proxcgal.study.jobs import Report, StoppedError
+from proxcgal.study.jobs import StoppedError
 from proxcgal.study.workers import Pool
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def keep_worst(
     todo = {n: e for n, e in files.items() if not _there(place / n, e.trial, ticks)}
     jobs = [functools.partial(_record, e.trial, place / name, ticks) for name, e in todo.items()]
     sizes = [each.trial.scenario.duration for each in todo.values()]
-    with Progress("recording the worst", sizes, "s", quiet=quiet) as progress:
+    with ProgressBar("recording the worst", sizes, "s", quiet=quiet) as progress:
         answers = pool.run(jobs, progress.shares, on_lost=_lost)
     errors: dict[str, str] = {}
     for (name, each), answer in zip(todo.items(), answers, strict=True):
@@ -93,7 +93,9 @@ def _lost(_: int, deaths: int) -> str:
     return f"its worker process died, {deaths} times (out of memory?)"
 
 
-def _record(trial: Trial, path: Path, ticks: RecordedTicks, report: Report) -> dict[str, Any] | str:
+def _record(
+    trial: Trial, path: Path, ticks: RecordedTicks, report: OnProgress
+) -> dict[str, Any] | str:
     """Records one trial, in whichever process; the file is whole, or not there and the error told.
 
     Returns:

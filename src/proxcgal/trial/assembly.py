@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from proxcgal.scenario.setup import Setup
-from proxcgal.scenario.walkthrough import GuidedScenario
+from proxcgal.scenario.walkthrough_scenario import GuidedScenario
 from proxcgal.sim.assembly import Assembly
 from proxcgal.sim.source import SimulatedSource
 from proxcgal.trial.walkthrough.guided_source import GuidedSource

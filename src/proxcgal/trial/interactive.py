@@ -14,8 +14,8 @@ import numpy as np
 from proxcgal.core.modes import STOP
 from proxcgal.core.typing import Array
 from proxcgal.evaluation.ground_truth import GroundTruth
-from proxcgal.models import Robot
-from proxcgal.scenario.loading import Scenario
+from proxcgal.models.robots import Robot
+from proxcgal.scenario.scenario import Scenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.scene.dragging import DraggedSolids, LiveScene
 from proxcgal.sim.clouds import Clouds

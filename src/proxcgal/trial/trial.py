@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from proxcgal.core.progress import OnProgress
 from proxcgal.core.typing import Array, Bools
 from proxcgal.evaluation.coverage import coverage_of, sightings
 from proxcgal.evaluation.ground_truth import NOT_ASKED, GroundTruth
@@ -15,19 +16,17 @@ from proxcgal.evaluation.sparse_ground_truth import sparse_ground_truth
 from proxcgal.evaluation.stall_diagnosis import concluded
 from proxcgal.evaluation.termination import Ending, GoalWatch
 from proxcgal.evaluation.trial_log import TOO_CLOSE, TrialLog, final_ticks, sampled_ticks
-from proxcgal.models import Robot
+from proxcgal.models.robots import Robot
 from proxcgal.recording.replay import first_difference, recompute
 from proxcgal.recording.trial_recorder import TrialRecorder
 from proxcgal.recording.writer import Recorder
-from proxcgal.scenario.loading import CONTROLLERS, Scenario
+from proxcgal.scenario.scenario import CONTROLLERS, Scenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.sim.assembly import Assembly
 from proxcgal.sim.tick import Tick, TickResult, TickTruth
 from proxcgal.trial.assembly import assemble
 
 __all__ = ["CONTROLLERS", "TrialLog", "first_difference", "recompute", "run_trial"]
-
-Progress = Callable[[float], None]
 
 
 def run_trial(
@@ -37,7 +36,7 @@ def run_trial(
     seed: int | None = None,
     robot: Robot | None = None,
     recorder: Recorder | None = None,
-    on_progress: Progress | None = None,
+    on_progress: OnProgress | None = None,
     sparse_truth: bool = False,
     without_truth: bool = False,
     coverage: bool = False,
@@ -84,7 +83,7 @@ def run_trial(
 
 
 def _simulate(
-    run: Assembly, truth: GroundTruth | None, recorder: Recorder | None, on_progress: Progress
+    run: Assembly, truth: GroundTruth | None, recorder: Recorder | None, on_progress: OnProgress
 ) -> tuple[list[Tick], Array, Ending | None]:
     """Tick after tick until the scenario's end, or the goal's; recorded on the way.
 

@@ -11,7 +11,7 @@ from multiprocessing.connection import Connection
 import viser
 
 from proxcgal.core.errors import SimulationError
-from proxcgal.scenario.loading import Scenario
+from proxcgal.scenario.scenario import Scenario
 from proxcgal.viewer.access import Gate
 from proxcgal.viewer.command_queue import CommandQueue
 from proxcgal.viewer.controls import Controls

@@ -15,9 +15,10 @@ import numpy as np
 
 from proxcgal.core.errors import ModelError
 from proxcgal.models.description import listed
-from proxcgal.models.formats.common import WORLD, Shape, is_direction, numbers
 from proxcgal.models.formats.paths import MeshFolders
-from proxcgal.models.mesh.files import box, capsule, cylinder, ellipsoid
+from proxcgal.models.formats.pinocchio_model import WORLD, Shape
+from proxcgal.models.formats.safe_xml import is_direction, parse_numbers
+from proxcgal.models.mesh.shapes import box, capsule, cylinder, ellipsoid
 
 _NOT_READ = ("include", "frame", "replicate", "attach", "composite", "flexcomp", "plugin")
 _NUMBERS = {"pos": 3, "quat": 4, "axis": 3, "euler": 3, "xyaxes": 6, "zaxis": 3, "axisangle": 4}
@@ -86,7 +87,7 @@ def _check_body(body: ET.Element, names: set[str], path: Path) -> None:
                 what = (
                     f"{path}: <{element.tag}> '{element.get('name', '')}' in body '{name}', {key}"
                 )
-                values = numbers(element.get(key, ""), count, what)
+                values = parse_numbers(element.get(key, ""), count, what)
                 if key in ("axis", "quat") and not is_direction(values):
                     raise ModelError(f"{what} is all zeros, or nearly; a direction is needed")
     for joint in joints:

@@ -12,12 +12,12 @@ from proxcgal.core.errors import ModelError
 # A description may sit in such a folder of its package, with the meshes beside that folder.
 _DESCRIPTION_FOLDERS = {"urdf", "xacro", "robots", "robot", "mjcf", "xml", "model", "models"}
 
-SUFFIXES = (".urdf", ".xacro", ".xml", ".mjcf", ".toml")
+ROBOT_SUFFIXES = (".urdf", ".xacro", ".xml", ".mjcf", ".toml")
 
 
 def is_robot_file(name: str | os.PathLike[str]) -> bool:
     """Whether a robot's name is a path to its description, by the ending."""
-    return Path(name).suffix.lower() in SUFFIXES
+    return Path(name).suffix.lower() in ROBOT_SUFFIXES
 
 
 class MeshFolders:

@@ -10,7 +10,7 @@ from proxcgal.core.errors import ConfigError
 from proxcgal.core.typing import Array
 from proxcgal.scene.human import gait
 from proxcgal.scene.human.body import POINTS
-from proxcgal.scene.human.operator import Operator, Step
+from proxcgal.scene.human.operator_keys import Operator, Step
 from proxcgal.scene.human.smooth import Glide, Track, least_duration, minimum_jerk, slerp, two_bones
 from proxcgal.scene.human.stance import (
     CARRYING,

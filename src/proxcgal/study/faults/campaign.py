@@ -10,7 +10,7 @@ import polars as pl
 from proxcgal.core import modes
 from proxcgal.core.errors import ConfigError
 from proxcgal.evaluation.metrics import Summary
-from proxcgal.scenario.keys import FAULT_VALUES
+from proxcgal.scenario.fault_keys import FAULT_VALUES
 from proxcgal.scenario.loading import load_scenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.sim.assembly import Assembly
@@ -24,10 +24,10 @@ from proxcgal.study.trials import identity, robot_of, simulate
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from proxcgal.scenario.loading import Scenario
-    from proxcgal.study.jobs import Report
+    from proxcgal.core.progress import OnProgress
+    from proxcgal.evaluation.trial_log import TrialLog
+    from proxcgal.scenario.scenario import Scenario
     from proxcgal.study.store import Row as Numbers
-    from proxcgal.trial.trial import TrialLog
 
 #: Scenes in which the arm moves, and every sensor sees a room.
 SCENES = ("timing_ur10e", "timing_panda")
@@ -142,7 +142,7 @@ def _assignment(faults: Any, start: float, end: float) -> str:
     return f"fault=[{', '.join(tables)}]"
 
 
-def perform(trial: Trial, report: Report) -> Numbers:
+def perform(trial: Trial, report: OnProgress) -> Numbers:
     """One trial beside its row's requirements."""
     row = ROW_OF[str(trial.tags["row"])]
     if row.refused:
@@ -176,7 +176,7 @@ def perform(trial: Trial, report: Report) -> Numbers:
     }
 
 
-def _refused(trial: Trial, report: Report) -> Numbers:
+def _refused(trial: Trial, report: OnProgress) -> Numbers:
     """Is that very sensor found before the run, and no other?"""
     setup = Setup.of(trial.scenario, robot_of(trial.scenario, trial.robot_digest))
     checks = Assembly.of(setup, trial.controller, trial.seed).mount_checks()
@@ -190,13 +190,13 @@ def _refused(trial: Trial, report: Report) -> Numbers:
     }  # fmt: skip
 
 
-def _same(trial: Trial, log: TrialLog, report: Report) -> bool:
+def _same(trial: Trial, log: TrialLog, report: OnProgress) -> bool:
     """Are the commands those of the same trial without the fault?"""
     other = _simulate(trial, trial.scenario.model_copy(update={"faults": ()}), report)
     return bool(np.array_equal(log.qd, other.qd))
 
 
-def _simulate(trial: Trial, scenario: Scenario, report: Report) -> TrialLog:
+def _simulate(trial: Trial, scenario: Scenario, report: OnProgress) -> TrialLog:
     return simulate(
         scenario, trial.controller, trial.seed, report,
         robot_digest=trial.robot_digest, without_truth=True,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from proxcgal.core.modes import RUN
-from proxcgal.evaluation.metrics import counted
+from proxcgal.core.tables import counted
 from proxcgal.study.faults.cases import Row
 
 _CONTROLLER = "cpp/tests/control/test_controller.cpp"

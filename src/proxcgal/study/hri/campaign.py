@@ -11,17 +11,19 @@ import polars as pl
 
 from proxcgal.core.errors import ConfigError
 from proxcgal.core.modes import HOLD
+from proxcgal.core.progress import OnProgress
 from proxcgal.core.typing import Array
 from proxcgal.evaluation.phases import SAMPLES_HZ, mean_distances
 from proxcgal.evaluation.trial_log import TOO_CLOSE, TrialLog, sampled_ticks
-from proxcgal.scenario.loading import CONTROLLERS, HriScenario, load_scenario
+from proxcgal.scenario.hri_scenario import HriScenario
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.scenario.scenario import CONTROLLERS
 from proxcgal.scenario.setup import Setup
 from proxcgal.study.campaign import Campaign, Trial, plain
 from proxcgal.study.hri.figures import figures
 from proxcgal.study.hri.layouts import draw_layout
 from proxcgal.study.hri.metrics import analyse
 from proxcgal.study.hri.texts import captions, introduction, listings, verdicts
-from proxcgal.study.jobs import Report
 from proxcgal.study.kind import CampaignRequest, Kind
 from proxcgal.study.store import Row, Series
 from proxcgal.study.trials import identity, robot_of, simulate
@@ -150,7 +152,7 @@ def _operated(source: str, overrides: tuple[str, ...]) -> HriScenario:
     return scenario
 
 
-def perform(trial: Trial, report: Report) -> Row:
+def perform(trial: Trial, report: OnProgress) -> Row:
     """One trial's numbers and, at the sensors' rate, its course."""
     log = simulate(
         trial.scenario, trial.controller, trial.seed, report, robot_digest=trial.robot_digest,

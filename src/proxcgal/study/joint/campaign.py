@@ -5,13 +5,14 @@ from __future__ import annotations
 import polars as pl
 
 from proxcgal.core.errors import ConfigError
+from proxcgal.core.progress import OnProgress
 from proxcgal.evaluation.metrics import SELF_LIMIT_M, Summary
 from proxcgal.models.macro_micro import part
-from proxcgal.scenario.joint import JointScenario
-from proxcgal.scenario.loading import CONTROLLERS, load_scenario
+from proxcgal.scenario.joint_scenario import JointScenario
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.scenario.scenario import CONTROLLERS
 from proxcgal.scenario.setup import Setup
 from proxcgal.study.campaign import Campaign, Trial, plain
-from proxcgal.study.jobs import Report
 from proxcgal.study.joint.figures import captions, figures
 from proxcgal.study.joint.metrics import COLUMNS, numbers_of
 from proxcgal.study.joint.texts import listings, verdicts
@@ -100,7 +101,7 @@ def plan(request: CampaignRequest) -> Campaign:
     return Campaign(description=description, trials=trials, perform=perform, columns=COLUMNS)
 
 
-def perform(trial: Trial, report: Report) -> Row:
+def perform(trial: Trial, report: OnProgress) -> Row:
     """One run's numbers."""
     log = simulate(
         trial.scenario, trial.controller, trial.seed, report, robot_digest=trial.robot_digest

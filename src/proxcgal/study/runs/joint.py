@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from proxcgal.core.errors import ConfigError
-from proxcgal.core.progress import Progress
+from proxcgal.core.progress import ProgressBar
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from proxcgal.evaluation.metrics import Summary
-    from proxcgal.scenario.joint import JointScenario
-    from proxcgal.trial.trial import TrialLog
+    from proxcgal.evaluation.trial_log import TrialLog
+    from proxcgal.scenario.joint_scenario import JointScenario
 
 FIGURE = "joint.png"
 _PERCEPTIONS = {"wb_known": "known", "wb_memory": "memory", "sm": "sensed, sensor points"}
@@ -38,8 +38,9 @@ def run_joint(
     Raises:
         ProxError: what does not fit, a run that cannot go on.
     """
+    from proxcgal.core.files import write_bytes, write_json, write_text
     from proxcgal.core.provenance import origin
-    from proxcgal.evaluation.metrics import SELF_LIMIT_M, write_bytes, write_json, write_text
+    from proxcgal.evaluation.metrics import SELF_LIMIT_M
     from proxcgal.models.macro_micro import part
     from proxcgal.report.report import write_report
     from proxcgal.study.figures import png
@@ -110,7 +111,7 @@ def _rows(
     ]
     with (
         Pool(workers or default_workers(len(jobs))) as pool,
-        Progress("simulating", [s.duration for s, _ in jobs], "s", quiet=quiet) as progress,
+        ProgressBar("simulating", [s.duration for s, _ in jobs], "s", quiet=quiet) as progress,
     ):
 
         def done(row: int, log: TrialLog) -> None:
@@ -135,7 +136,7 @@ def _rows(
 
 def _named(levels: Sequence[str]) -> str:
     """The stack's name where it has one, else its tasks."""
-    from proxcgal.scenario.controller import STACKS
+    from proxcgal.scenario.controller_keys import STACKS
 
     known: dict[tuple[str, ...], str] = {tasks: name for name, tasks in STACKS.items()}
     return known.get(tuple(levels), ", ".join(levels))

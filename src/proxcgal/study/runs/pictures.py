@@ -10,20 +10,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from proxcgal.core.errors import SimulationError
-from proxcgal.evaluation.metrics import write_bytes
-from proxcgal.scenario.loading import HriScenario
+from proxcgal.core.files import write_bytes
+from proxcgal.scenario.hri_scenario import HriScenario
 
 if TYPE_CHECKING:
-    from proxcgal.scenario.loading import Scenario
+    from proxcgal.core.progress import OnProgress
+    from proxcgal.evaluation.trial_log import TrialLog
+    from proxcgal.scenario.scenario import Scenario
     from proxcgal.study.figures import Signals
-    from proxcgal.study.jobs import Report
-    from proxcgal.trial.trial import TrialLog
 
 DRAWN_SPACING_M = 0.03  # [m] between the obstacle's points in a figure
 MOVING = ("wb", "sm")  # whose recordings the moving picture shows, side by side
 
 
-def draw_figures(scenario: Scenario, logs: Sequence[TrialLog], folder: Path, report: Report) -> str:
+def draw_figures(
+    scenario: Scenario, logs: Sequence[TrialLog], folder: Path, report: OnProgress
+) -> str:
     """Draws `distance.png` and, where a posture shows a pair, `pairs.png`; what was drawn."""
     from proxcgal.scenario.setup import Setup
     from proxcgal.study.figures import png, time_figure
@@ -79,7 +81,7 @@ def _draw_pairs(scenario: Scenario, logs: Sequence[TrialLog], folder: Path) -> s
     return ", pairs.png"
 
 
-def draw_motion(scenario: Scenario, folder: Path, report: Report) -> str:
+def draw_motion(scenario: Scenario, folder: Path, report: OnProgress) -> str:
     """Draws `motion.gif` and `motion.png` from the folder's recordings; what was drawn, or why not.
 
     A machine that cannot draw off screen still gets all its numbers and figures.

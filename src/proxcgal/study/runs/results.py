@@ -14,14 +14,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proxcgal.core.errors import ConfigError
-from proxcgal.core.progress import Progress, announce
-from proxcgal.evaluation.metrics import Summary, combined, static_summary, write_json, write_text
+from proxcgal.core.files import write_json, write_text
+from proxcgal.core.progress import ProgressBar, announce
+from proxcgal.evaluation.metrics import Summary, combined, static_summary
 from proxcgal.study.workers import Pool, default_workers
 
 if TYPE_CHECKING:
-    from proxcgal.models import Robot
-    from proxcgal.scenario.loading import Scenario
-    from proxcgal.trial.trial import TrialLog
+    from proxcgal.evaluation.trial_log import TrialLog
+    from proxcgal.models.robots import Robot
+    from proxcgal.scenario.scenario import Scenario
 
 #: What a run writes, recordings apart. Older ones are removed before a run begins: an interrupted
 #: run must not leave its recordings beside another run's numbers.
@@ -98,8 +99,9 @@ def perform(
 def _summary(scenario: Scenario, logs: Sequence[TrialLog]) -> Summary:
     """What `summary.json` says, with what belongs to the kind of scene alone."""
     from proxcgal.evaluation.phases import mean_distances
-    from proxcgal.scenario.loading import HriScenario
-    from proxcgal.trial.walkthrough.guided_source import GuidedScenario, off_paths
+    from proxcgal.scenario.hri_scenario import HriScenario
+    from proxcgal.scenario.walkthrough_scenario import GuidedScenario
+    from proxcgal.trial.walkthrough.guided_source import off_paths
 
     summary = static_summary(logs)
     if isinstance(scenario, HriScenario):
@@ -139,7 +141,7 @@ def check(
             sit where the scenario says.
     """
     from proxcgal.scenario.setup import Setup
-    from proxcgal.scenario.walkthrough import WalkScenario
+    from proxcgal.scenario.walkthrough_scenario import WalkScenario
     from proxcgal.trial.assembly import assemble
     from proxcgal.trial.walkthrough.setup import WalkSetup
 
@@ -201,7 +203,7 @@ def ready(folders: Sequence[Path]) -> list[Path]:
     except OSError as error:
         remove_empty(made)
         raise ConfigError(f"--out {folder}: cannot be written: {error.strerror or error}") from None
-    from proxcgal.scenario.loading import CONTROLLERS
+    from proxcgal.scenario.scenario import CONTROLLERS
 
     for folder in folders:
         for name in (*FILES, *(f"{controller}.mcap" for controller in CONTROLLERS)):
@@ -224,7 +226,7 @@ def _simulate(pool: Pool, trials: Sequence[tuple[Plan, str]], quiet: bool) -> li
         for plan, name in trials
     ]
     seconds = [plan.scenario.duration for plan, _ in trials]
-    with Progress("simulating", seconds, "s", quiet=quiet) as progress:
+    with ProgressBar("simulating", seconds, "s", quiet=quiet) as progress:
 
         def done(row: int, log: TrialLog) -> None:
             numbers = log.summary()
@@ -259,7 +261,7 @@ def _draw(
         if pictures:  # first: it takes longest
             jobs.append(functools.partial(draw_motion, plan.scenario, plan.folder))
         jobs.append(functools.partial(draw_figures, plan.scenario, list(logs), plan.folder))
-    with Progress("drawing", [1.0] * len(jobs), "", quiet=quiet) as progress:
+    with ProgressBar("drawing", [1.0] * len(jobs), "", quiet=quiet) as progress:
         pool.run(jobs, progress.shares, lambda _, text: progress.finished(text))
 
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from proxcgal.core.progress import Progress, announce
-from proxcgal.evaluation.metrics import aligned, write_bytes
+from proxcgal.core.files import write_bytes
+from proxcgal.core.progress import ProgressBar, announce
+from proxcgal.core.tables import aligned
 
 if TYPE_CHECKING:
-    from proxcgal.scenario.walkthrough import WalkScenario
+    from proxcgal.scenario.walkthrough_scenario import WalkScenario
     from proxcgal.trial.walkthrough.run import WalkResult
     from proxcgal.trial.walkthrough.setup import WalkSetup
 
@@ -46,7 +47,7 @@ def run_walkthrough(
     for name in (RECORDING, FIGURE, TABLE, TRAJECTORY, RATINGS):
         (folder / name).unlink(missing_ok=True)
     try:
-        with Progress("teaching", [1.0], "", quiet=quiet) as progress:
+        with ProgressBar("teaching", [1.0], "", quiet=quiet) as progress:
             result = run_walk(
                 setup, seed=scenario.seed, recording=folder / RECORDING,
                 on_progress=lambda share: progress.shares([share]),
@@ -64,7 +65,7 @@ def run_walkthrough(
 def _write(
     setup: WalkSetup, result: WalkResult, folder: Path, origin: dict[str, Any]
 ) -> dict[str, Any]:
-    from proxcgal.evaluation.metrics import write_json, write_text
+    from proxcgal.core.files import write_json, write_text
     from proxcgal.study.figures import png
     from proxcgal.study.walkthrough.figures import teach_figure, trip_figure
     from proxcgal.trial.walkthrough.taught_path import to_csv, to_trajectory

@@ -9,20 +9,15 @@ import numpy as np
 import polars as pl
 
 from proxcgal.core.errors import ConfigError
+from proxcgal.core.files import NOTHING_M, finite
 from proxcgal.core.modes import HOLD
-from proxcgal.evaluation.metrics import (
-    CONTROLLER_KEYS,
-    COVERAGE_KEYS,
-    NOTHING_M,
-    SELF_LIMIT_M,
-    Summary,
-    finite,
-)
-from proxcgal.scenario.loading import CONTROLLERS, Scenario, load_scenario
+from proxcgal.core.progress import OnProgress
+from proxcgal.evaluation.metrics import CONTROLLER_KEYS, COVERAGE_KEYS, SELF_LIMIT_M, Summary
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.scenario.scenario import CONTROLLERS, Scenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.study.bootstrap import median_interval
 from proxcgal.study.campaign import Campaign, Trial, plain
-from proxcgal.study.jobs import Report
 from proxcgal.study.kind import CampaignRequest, Kind
 from proxcgal.study.paired import ends_of, pairs
 from proxcgal.study.static.draws import draw_scene
@@ -94,7 +89,7 @@ def plan(request: CampaignRequest) -> Campaign:
     )  # fmt: skip
 
 
-def perform(trial: Trial, report: Report) -> Row:
+def perform(trial: Trial, report: OnProgress) -> Row:
     """One trial's numbers, beside what was drawn for it."""
     log = simulate(
         trial.scenario, trial.controller, trial.seed, report, robot_digest=trial.robot_digest,

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from proxcgal.core.errors import ConfigError
 from proxcgal.evaluation.metrics import Summary
-from proxcgal.scenario.walkthrough import WalkScenario
+from proxcgal.scenario.walkthrough_scenario import WalkScenario
 from proxcgal.study.campaign import Campaign, Trial
 from proxcgal.study.figures import DASHED, DPI, GREY
 from proxcgal.study.kind import CampaignRequest, Kind, Listing
@@ -23,7 +23,7 @@ from proxcgal.trial.walkthrough.taught_path import clean_path
 from proxcgal.trial.walkthrough.teaching import teach
 
 if TYPE_CHECKING:
-    from proxcgal.study.jobs import Report
+    from proxcgal.core.progress import OnProgress
     from proxcgal.study.store import Row
 
 COLUMNS = (
@@ -71,7 +71,7 @@ def plan(request: CampaignRequest) -> Campaign:
     )  # fmt: skip
 
 
-def perform(trial: Trial, report: Report) -> Row:
+def perform(trial: Trial, report: OnProgress) -> Row:
     """One operator: taught; where nothing tripped, cleaned and played back."""
     assert isinstance(trial.scenario, WalkScenario)
     setup = WalkSetup.of(trial.scenario, robot_of(trial.scenario, trial.robot_digest))

@@ -9,16 +9,17 @@ from typing import cast
 import numpy as np
 
 from proxcgal import _core
+from proxcgal.core.transforms import rotation_from_vector
 from proxcgal.core.typing import Array
 from proxcgal.evaluation.trial_log import TrialLog
 from proxcgal.scenario.setup import Setup
-from proxcgal.scenario.walkthrough import GuidedScenario
+from proxcgal.scenario.walkthrough_scenario import GuidedScenario
 from proxcgal.sim.source import SimulatedSource
 from proxcgal.sim.tick import TickInput
 from proxcgal.sim.world import World
 from proxcgal.trial.walkthrough.intended_path import IntendedPath
 from proxcgal.trial.walkthrough.interactive_hand import InteractiveHand
-from proxcgal.trial.walkthrough.operator_hand import OperatorHand, rotation_of
+from proxcgal.trial.walkthrough.operator_hand import OperatorHand
 
 __all__ = ["GuidedScenario", "GuidedSource", "off_path", "off_paths"]
 
@@ -62,7 +63,7 @@ class GuidedSource(SimulatedSource):
         self._cycle += 1
         goal = T.copy()
         goal[:3, 3] += wanted[:3] / self._gain
-        goal[:3, :3] = rotation_of(wanted[3:] / self._gain) @ T[:3, :3]
+        goal[:3, :3] = rotation_from_vector(wanted[3:] / self._gain) @ T[:3, :3]
         return replace(inputs, goal=goal)
 
     def take_over(self) -> InteractiveHand:

@@ -13,7 +13,7 @@ import numpy as np
 from proxcgal import _core
 from proxcgal.core.transforms import pose
 from proxcgal.core.typing import Array
-from proxcgal.scenario.walkthrough import WalkScenario
+from proxcgal.scenario.walkthrough_scenario import WalkScenario
 from proxcgal.sim.moment import Posed
 from proxcgal.trial.walkthrough.guarded_arm import GuardedArm
 from proxcgal.trial.walkthrough.interactive_hand import HAND, InteractiveHand

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from proxcgal.core.typing import Array
-from proxcgal.scenario.walkthrough import Hand as HandKeys
+from proxcgal.scenario.walkthrough_keys import HandKeys
 from proxcgal.trial.walkthrough.operator_hand import HandImpedance
 
 HAND = "hand at the tool"  #: its name, beside those of solids

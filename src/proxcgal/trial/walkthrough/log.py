@@ -9,7 +9,7 @@ import numpy as np
 
 from proxcgal import _core
 from proxcgal.core.typing import Array, Bools
-from proxcgal.scenario.walkthrough import Guard
+from proxcgal.scenario.walkthrough_keys import GuardKeys
 from proxcgal.sim.physics import GuardTruth, Physics
 
 
@@ -56,7 +56,7 @@ class WalkLog:
     left_m: float | None = None  #: of the tool from where the intended path ends; None after a trip
 
     @classmethod
-    def empty(cls, cycles: int, joints: int, period: float, keys: Guard) -> WalkLog:
+    def empty(cls, cycles: int, joints: int, period: float, keys: GuardKeys) -> WalkLog:
         """Room for so many cycles under a guard with these keys."""
         columns: dict[str, Any] = {name: np.full(cycles, np.nan) for name in _COLUMNS}
         return cls(

@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
+from proxcgal.core.transforms import rotation_from_vector, sine_axis_between
 from proxcgal.core.typing import Array
-from proxcgal.scenario.walkthrough import Hand as HandKeys
+from proxcgal.scenario.walkthrough_keys import HandKeys
 from proxcgal.trial.walkthrough.intended_path import IntendedPath
 
 _TREMOR_HZ = (8.0, 12.0)
@@ -56,7 +57,7 @@ class HandImpedance:
         force[:3] += keys.damping * (twist[:3] - tool[2][:3])
         if extra is not None:
             force[:3] += extra
-        force[3:] = keys.turn_stiffness * _turn_between(tool[1], rotation)
+        force[3:] = keys.turn_stiffness * sine_axis_between(tool[1], rotation)
         force[3:] += keys.turn_damping * (twist[3:] - tool[2][3:])
         _bound(force[:3], keys.max_force)
         _bound(force[3:], keys.max_torque)
@@ -105,7 +106,7 @@ class OperatorHand:
         self._twist[:3], self._twist[3:] = path.velocity[row], path.spin[row]
         return self._pull.force(
             (position, rotation, twist), self._start[:3, 3] + path.position[row],
-            rotation_of(path.turn[row]) @ self._start[:3, :3], self._twist,
+            rotation_from_vector(path.turn[row]) @ self._start[:3, :3], self._twist,
             self._tremor[min(cycle, len(self._tremor) - 1)],
         )  # fmt: skip
 
@@ -118,35 +119,6 @@ def _bound(vector: Array, most: float) -> None:
     length = math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
     if length > most:
         vector *= most / length
-
-
-def _turn_between(here: Array, there: Array) -> Array:
-    """(3,) rotation vector from one orientation to another, to first order beyond small angles."""
-    axis = np.zeros(3)
-    for column in range(3):
-        a, b = here[:, column], there[:, column]
-        axis[0] += a[1] * b[2] - a[2] * b[1]
-        axis[1] += a[2] * b[0] - a[0] * b[2]
-        axis[2] += a[0] * b[1] - a[1] * b[0]
-    return 0.5 * axis
-
-
-def rotation_of(vector: Array) -> Array:
-    """(3, 3) of a rotation vector [rad]."""
-    x, y, z = (float(v) for v in vector)
-    angle = math.sqrt(x * x + y * y + z * z)
-    if angle < 1e-12:
-        return np.eye(3)
-    x, y, z = x / angle, y / angle, z / angle
-    s, c = math.sin(angle), math.cos(angle)
-    v = 1.0 - c
-    return np.array(
-        (
-            (c + x * x * v, x * y * v - z * s, x * z * v + y * s),
-            (y * x * v + z * s, c + y * y * v, y * z * v - x * s),
-            (z * x * v - y * s, z * y * v + x * s, c + z * z * v),
-        )
-    )
 
 
 def _tremor(cycles: int, period: float, rms: float, seed: int) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 
 from proxcgal.core.errors import ConfigError
 from proxcgal.core.typing import Array
-from proxcgal.models import Robot
+from proxcgal.models.robots import Robot
 from proxcgal.trial.walkthrough.guarded_arm import GuardedArm
 from proxcgal.trial.walkthrough.log import WalkLog
 from proxcgal.trial.walkthrough.setup import PERIOD, WalkSetup

@@ -17,8 +17,8 @@ from mcap.records import Message, Metadata
 from mcap.stream_reader import StreamReader
 
 from proxcgal.core.errors import RecordingError
+from proxcgal.core.provenance import versions
 from proxcgal.core.typing import Array
-from proxcgal.core.versions import versions
 from proxcgal.recording.foxglove import nanoseconds
 from proxcgal.recording.mcap_file import SETTINGS, McapFile
 

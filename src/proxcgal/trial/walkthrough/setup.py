@@ -12,10 +12,10 @@ import numpy as np
 from proxcgal import _core
 from proxcgal.core.errors import ConfigError
 from proxcgal.core.typing import Array
-from proxcgal.models import Robot, load_robot
 from proxcgal.models.builtin import ga_ol
 from proxcgal.models.formats.capsule_robot import CapsuleRobot, read_capsule_robot
-from proxcgal.scenario.walkthrough import WalkScenario
+from proxcgal.models.robots import Robot, load_robot
+from proxcgal.scenario.walkthrough_scenario import WalkScenario
 from proxcgal.sim.physics import Physics
 
 PERIOD = 0.001  #: [s] of the guard's, the guiding's and the physics' cycle, [WT] section 3

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 
 from proxcgal.core.errors import ConfigError
+from proxcgal.core.transforms import nearest_quaternion
 from proxcgal.core.typing import Array
-from proxcgal.models import Robot
+from proxcgal.models.robots import Robot
 
 _REST = 1e-3  # [rad/s] of every joint: slower at the ends is waiting
 _KEPT = 0.1  # [s] of waiting that is kept at each end
@@ -119,7 +120,7 @@ def to_csv(robot: Robot, path: TaughtPath) -> str:
     table.writerow(["time_s", *names, "x_m", "y_m", "z_m", "qx", "qy", "qz", "qw"])
     for time, q in zip(path.time, path.q, strict=True):
         T = np.array(robot.tool_pose(q))
-        row = [time, *q, *T[:3, 3], *_quaternion(T[:3, :3])]
+        row = [time, *q, *T[:3, 3], *nearest_quaternion(T[:3, :3])]
         table.writerow([f"{value:.9g}" for value in row])
     return text.getvalue()
 
@@ -164,17 +165,3 @@ def _smoothed(q: Array, sigma: float) -> Array:
 
 def _sampled(time: Array, q: Array, samples: Array) -> Array:
     return np.stack([np.interp(samples, time, column) for column in q.T], axis=1)
-
-
-def _quaternion(R: Array) -> Array:
-    """(4,) x, y, z, w, w not negative."""
-    K = np.array(
-        [
-            [R[0, 0] - R[1, 1] - R[2, 2], 0, 0, 0],
-            [R[0, 1] + R[1, 0], R[1, 1] - R[0, 0] - R[2, 2], 0, 0],
-            [R[0, 2] + R[2, 0], R[1, 2] + R[2, 1], R[2, 2] - R[0, 0] - R[1, 1], 0],
-            [R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1], np.trace(R)],
-        ]
-    )
-    vector = np.linalg.eigh(K / 3.0, "L")[1][:, -1]
-    return vector if vector[3] >= 0 else -vector

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from proxcgal.core.errors import ConfigError
-from proxcgal.scenario.walkthrough import WalkScenario
+from proxcgal.scenario.walkthrough_scenario import WalkScenario
 from proxcgal.trial.walkthrough.guarded_arm import GuardedArm
 from proxcgal.trial.walkthrough.intended_path import IntendedPath
 from proxcgal.trial.walkthrough.log import WalkLog

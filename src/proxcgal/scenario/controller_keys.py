@@ -6,15 +6,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from proxcgal.scenario.keys import (
-    Bound,
-    Count,
-    NonNegative,
-    Positive,
-    Section,
-    Share,
-    like,
-)
+from proxcgal.core.schema import Bound, Count, NonNegative, Positive, Section, Share, like
 
 SensedController = Literal["wb", "sm", "wb_memory"]
 TaskName = Literal[
@@ -39,7 +31,7 @@ STACKS: dict[str, tuple[TaskName, ...]] = {
 }
 
 
-class Filter(Section):
+class FilterKeys(Section):
     """Body removal."""
 
     tolerance: NonNegative = like("FilterConfig", "tolerance", "[m] epsilon of Algorithm 1")
@@ -58,7 +50,7 @@ class Filter(Section):
     z_min: Bound = like("FilterConfig", "z_min", "[m] points below are cropped (floor)")
 
 
-class Solver(Section):
+class SolverKeys(Section):
     """The task-priority solver."""
 
     damping: NonNegative = like("SolverConfig", "damping", "lambda")
@@ -71,7 +63,7 @@ class Solver(Section):
     form: Literal["literal", "code"] = like("SolverConfig", "form", "of the damped inverse")
 
 
-class Monitor(Section):
+class MonitorKeys(Section):
     """Bounds of the monitor."""
 
     degraded_after: Positive = like(
@@ -119,7 +111,7 @@ class Monitor(Section):
     )
 
 
-class Memory(Section):
+class MemoryKeys(Section):
     """What `wb_memory` remembers."""
 
     memory_s: NonNegative = like(
@@ -143,7 +135,7 @@ class Memory(Section):
     )
 
 
-class Motion(Section):
+class MotionKeys(Section):
     """x_o of [WA] eq. (4), from the scans."""
 
     controllers: tuple[SensedController, ...] = Field(
@@ -161,14 +153,14 @@ class Motion(Section):
     )
 
 
-class JointLimits(Section):
+class JointLimitsKeys(Section):
     """Task `joint_limits`."""
 
     gain: Positive = like("JointLimits", "gain", "[1/s] towards the middle")
     margin: Positive = like("JointLimits", "margin", "[rad] or [m] where it begins to act")
 
 
-class MinimumAltitude(Section):
+class MinimumAltitudeKeys(Section):
     """Task `minimum_altitude`."""
 
     height: float = like("MinimumAltitude", "height", "[m] the tool is to stay above")
@@ -176,7 +168,7 @@ class MinimumAltitude(Section):
     gain: Positive = like("MinimumAltitude", "gain", "[1/s]")
 
 
-class Manipulability(Section):
+class ManipulabilityKeys(Section):
     """Task `manipulability`."""
 
     target: Positive = like("Manipulability", "target", "the rate pulls towards it")
@@ -196,7 +188,7 @@ class Manipulability(Section):
         return self
 
 
-class ArmManipulability(Section):
+class ArmManipulabilityKeys(Section):
     """Tasks `manipulability_macro` and `manipulability_micro`: one arm of two, normalised.
 
     The arm's manipulability counts as a share of the largest that 4000 random postures of the
@@ -209,7 +201,7 @@ class ArmManipulability(Section):
     gain: Positive = like("Manipulability", "gain", "[1/s]")
 
 
-class SelfCollision(Section):
+class SelfCollisionKeys(Section):
     """Task `self_collision`: links that joints beyond the first arm move, against all others."""
 
     d_min: NonNegative = like("SelfCollision", "d_min", "[m] distance to keep")
@@ -218,7 +210,7 @@ class SelfCollision(Section):
     nearest: Count = like("SelfCollision", "nearest", "this many nearest pairs of links", le=32)
 
 
-class Controller(Section):
+class ControllerKeys(Section):
     """The control law, the same for the whole body and for the sensor points."""
 
     d_min: Positive = like("Avoidance", "d_min", "[m] distance to keep")
@@ -249,17 +241,17 @@ class Controller(Section):
     method: Literal["fast", "paper"] = like(
         "ControllerConfig", "method", "accelerated or literal, with the same answer"
     )
-    filter: Filter = Field(default_factory=Filter)
-    solver: Solver = Field(default_factory=Solver)
-    monitor: Monitor = Field(default_factory=Monitor)
-    memory: Memory = Field(default_factory=Memory)
-    motion: Motion = Field(default_factory=Motion)
-    joint_limits: JointLimits = Field(default_factory=JointLimits)
-    minimum_altitude: MinimumAltitude = Field(default_factory=MinimumAltitude)
-    manipulability: Manipulability = Field(default_factory=Manipulability)
+    filter: FilterKeys = Field(default_factory=FilterKeys)
+    solver: SolverKeys = Field(default_factory=SolverKeys)
+    monitor: MonitorKeys = Field(default_factory=MonitorKeys)
+    memory: MemoryKeys = Field(default_factory=MemoryKeys)
+    motion: MotionKeys = Field(default_factory=MotionKeys)
+    joint_limits: JointLimitsKeys = Field(default_factory=JointLimitsKeys)
+    minimum_altitude: MinimumAltitudeKeys = Field(default_factory=MinimumAltitudeKeys)
+    manipulability: ManipulabilityKeys = Field(default_factory=ManipulabilityKeys)
 
-    arm_manipulability: ArmManipulability = Field(default_factory=ArmManipulability)
-    self_collision: SelfCollision = Field(default_factory=SelfCollision)
+    arm_manipulability: ArmManipulabilityKeys = Field(default_factory=ArmManipulabilityKeys)
+    self_collision: SelfCollisionKeys = Field(default_factory=SelfCollisionKeys)
 
     @property
     def levels(self) -> tuple[TaskName, ...]:

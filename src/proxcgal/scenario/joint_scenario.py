@@ -7,8 +7,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from proxcgal.scenario.keys import Positive, Section
-from proxcgal.scenario.loading import Scenario
+from proxcgal.scenario.goal_keys import FinishKeys
+from proxcgal.scenario.scenario import Scenario
 
 Configuration = Annotated[tuple[float, ...], Field(min_length=1)]
 
@@ -20,19 +20,6 @@ CONFIGURATIONS: dict[str, tuple[float, ...]] = {
     "mob_mob": (0.0, 0.785398, -1.578, 0.0, 0.785398, 0.0,
                 -3.14159, -2.10757, -1.83066, -0.774163, -1.5708, -0.0300288),
 }  # fmt: skip
-
-
-class Finish(Section):
-    """When a run has reached its goal, and when it is given up."""
-
-    position: Positive = Field(0.03, description="[m] error at which the goal is reached")
-    angle: Positive = Field(0.05, description="[rad] error at which it is, both together")
-    patience: Positive = Field(
-        5.0, description="[s] without progress after which the run is given up"
-    )
-    progress: Positive = Field(
-        0.01, description="[m] or [rad] that the least error so far must fall by, to be progress"
-    )
 
 
 class JointScenario(Scenario):
@@ -52,7 +39,7 @@ class JointScenario(Scenario):
         default_factory=lambda: dict(CONFIGURATIONS),
         description="[rad] or [m] joint positions by name",
     )
-    finish: Finish = Field(default_factory=Finish)
+    finish: FinishKeys = Field(default_factory=FinishKeys)
 
     @model_validator(mode="after")
     def _known_configurations(self) -> Self:
@@ -78,7 +65,7 @@ class JointScenario(Scenario):
         """Those of a run that names none: the whole body on what `perception` says."""
         return ("wb_known" if self.perception == "known" else "wb",)
 
-    def ends(self) -> Finish:
+    def ends(self) -> FinishKeys:
         """When a run is over before its time."""
         return self.finish
 

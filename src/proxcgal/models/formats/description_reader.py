@@ -11,10 +11,11 @@ from proxcgal.core.cache import Cache
 from proxcgal.core.errors import ModelError
 from proxcgal.models.description import RobotDescription
 from proxcgal.models.formats import mjcf, urdf
-from proxcgal.models.formats.common import WORLD, describe
-from proxcgal.models.formats.paths import SUFFIXES, MeshFolders, is_robot_file
+from proxcgal.models.formats.capsule_robot import read_capsule_robot
+from proxcgal.models.formats.description_cache import description_from, description_to
+from proxcgal.models.formats.paths import ROBOT_SUFFIXES, MeshFolders, is_robot_file
+from proxcgal.models.formats.pinocchio_model import WORLD, describe
 from proxcgal.models.formats.safe_xml import parse_xml
-from proxcgal.models.formats.stored import description_from, description_to
 
 # Bump when what is read from the same files changes.
 _VERSION = 1
@@ -42,10 +43,8 @@ def read_description(
     """
     path = Path(os.path.normpath(Path(path).absolute()))
     if not is_robot_file(path):
-        raise ModelError(f"{path}: {', '.join(SUFFIXES)} are read, not '{path.suffix}'")
+        raise ModelError(f"{path}: {', '.join(ROBOT_SUFFIXES)} are read, not '{path.suffix}'")
     if path.suffix.lower() == ".toml":
-        from proxcgal.models.formats.capsule_robot import read_capsule_robot  # loads pydantic
-
         return read_capsule_robot(path).description(str(path))
     folders = MeshFolders(path, package_dirs, packages)
     cache = Cache("description")

@@ -1,8 +1,7 @@
-"""What the readers of URDF and MJCF have in common: numbers, shapes, and pinocchio's model."""
+"""From pinocchio's model and the links' shapes to a description, for URDF and MJCF alike."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,14 +10,13 @@ from typing import Any
 import numpy as np
 
 from proxcgal.core.errors import ModelError
+from proxcgal.core.transforms import placed as place
 from proxcgal.core.typing import Array, Ints
 from proxcgal.models.description import Frame, Joint, Link, RobotDescription, listed
-from proxcgal.models.mesh.files import FARTHEST, clean, load_mesh
+from proxcgal.models.mesh.files import clean_mesh, load_mesh
 
 # The frame that the base stands in, where it has no link of its own.
 WORLD = "world"
-# An axis or quaternion shorter than this has no direction.
-_NO_DIRECTION = 1e-9
 # A tool frame by these names is taken where the user names none.
 TOOL_NAMES = ("tool0", "TCP", "tcp", "tool", "ee_link", "flange", "attachment_site")
 
@@ -31,51 +29,6 @@ class Shape:
     file: Path | None = None
     scale: Array | None = None  # (3,), of the file
     mesh: tuple[Array, Ints] | None = None
-
-
-def number(text: str, what: str, most: float = FARTHEST) -> float:
-    """One finite number of at most that size.
-
-    Raises:
-        ModelError: it is none.
-    """
-    return float(numbers(text, 1, what, most)[0])
-
-
-def numbers(text: str, count: int, what: str, most: float = FARTHEST) -> Array:
-    """So many finite numbers, as they stand in an XML attribute, each of at most that size.
-
-    Raises:
-        ModelError: they are not.
-    """
-    try:
-        values = np.array([float(token) for token in text.split()])
-    except ValueError:
-        values = np.empty(0)
-    if len(values) != count or not np.isfinite(values).all():
-        finite = "a finite number is" if count == 1 else f"{count} finite numbers are"
-        raise ModelError(f"{what} is '{text[:80]}'; {finite} needed")
-    if (np.abs(values) > most).any():
-        raise ModelError(f"{what} is '{text[:80]}'; at most {most:g} is taken")
-    return values
-
-
-def is_direction(values: Array) -> bool:
-    """Whether an axis or a quaternion says which way."""
-    return math.hypot(*values) > _NO_DIRECTION
-
-
-def transform(position: Sequence[float] | Array, rpy: Sequence[float] | Array) -> Array:
-    """(4, 4) of a position [m] and roll, pitch, yaw [rad]: Rz(yaw) Ry(pitch) Rx(roll)."""
-    (cr, sr), (cp, sp), (cy, sy) = ((math.cos(angle), math.sin(angle)) for angle in rpy)
-    T = np.eye(4)
-    T[:3, :3] = (
-        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
-        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
-        (-sp, cp * sr, cp * cr),
-    )
-    T[:3, 3] = position
-    return T
 
 
 def build_link_mesh(
@@ -98,17 +51,19 @@ def build_link_mesh(
         else:
             assert part.mesh is not None
             points, faces = part.mesh
-        with np.errstate(over="ignore", invalid="ignore"):  # `clean` refuses what is not finite
+        with np.errstate(
+            over="ignore", invalid="ignore"
+        ):  # `clean_mesh` refuses what is not finite
             if part.scale is not None:
                 points = points * part.scale
                 if np.prod(np.sign(part.scale)) < 0:  # mirrored: turn the faces back
                     faces = faces[:, ::-1]
-            vertices.append(points @ part.pose[:3, :3].T + part.pose[:3, 3])
+            vertices.append(place(part.pose, points))
         triangles.append(faces + count)
         count += len(points)
     files = sorted({str(part.file) for part in parts if part.file})
     what = f"link '{link}'" + (f" ({', '.join(files)})" if files else "")
-    return clean(np.concatenate(vertices), np.concatenate(triangles), what)
+    return clean_mesh(np.concatenate(vertices), np.concatenate(triangles), what)
 
 
 def describe(

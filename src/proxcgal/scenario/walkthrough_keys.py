@@ -1,22 +1,15 @@
-"""Scenario files of kind `walkthrough`: their keys, types, bounds, units and defaults."""
+"""The keys of a walk-through: `[guard]`, `[[leg]]`, `[hand]`, `[admittance]`, `[playback]`, ..."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from proxcgal import _core
-from proxcgal.core import toml
-from proxcgal.scenario.keys import Goal, NonNegative, Positive, Section, Sensor, Share, Skin
-from proxcgal.scenario.keys import Vector as Vector3
-from proxcgal.scenario.loading import Scenario
+from proxcgal.core.schema import NonNegative, Positive, Section, Share, Vector
 
 Vector6 = Annotated[tuple[float, ...], Field(min_length=6, max_length=6)]
-#: Keys of other kinds of scene, which say nothing here.
-_OTHERS = (
-    "goal", "skin", "controller", "simulation", "obstacle", "fault", "perception", "limits"
-)  # fmt: skip
 
 
 def _admittance(attribute: str, description: str) -> Any:
@@ -26,17 +19,17 @@ def _admittance(attribute: str, description: str) -> Any:
     return Field(plain, description=description)
 
 
-class Human(Section):
+class HumanKeys(Section):
     """The operator's capsule, which rides on the tool and stands upright."""
 
     radius: Positive = Field(0.200, description="[m] opRad")
     height: Positive = Field(1.80, description="[m] opH, rounding included")
-    offset: Vector3 = Field(
+    offset: Vector = Field(
         (0.0, 0.0, 0.25), description="[m] opRelP, of its middle in the tool's frame"
     )
 
 
-class Iso(Section):
+class IsoKeys(Section):
     """What the separation distance of ISO/TS 15066 is computed with, beside the threshold."""
 
     human_speed: NonNegative = Field(1.6, description="[m/s] v_h")
@@ -46,7 +39,7 @@ class Iso(Section):
     robot_uncertainty: NonNegative = Field(0.0, description="[m] Z_r")
 
 
-class Guard(Section):
+class GuardKeys(Section):
     """The guard: [WT] section 3."""
 
     tcp_speed: Positive = Field(1.30, description="[m/s] xd_UB")
@@ -62,11 +55,11 @@ class Guard(Section):
     )
     subtract_human: bool = Field(False, description="velocity relative to the tool's operator")
     accept: tuple[str, ...] = Field((), description="contradictions to take as they are, by item")
-    human: Human = Field(default_factory=Human)
-    iso: Iso = Field(default_factory=Iso)
+    human: HumanKeys = Field(default_factory=HumanKeys)
+    iso: IsoKeys = Field(default_factory=IsoKeys)
 
 
-class Admittance(Section):
+class AdmittanceKeys(Section):
     """M a + D v = F: three linear and three angular axes, in the base frame."""
 
     mass: Vector6 = _admittance("mass", "[kg], [kg m^2] M")
@@ -78,7 +71,7 @@ class Admittance(Section):
     )
 
 
-class Hand(Section):
+class HandKeys(Section):
     """The operator's hand: spring and damper that pull the handle along the wished path."""
 
     stiffness: Positive = Field(400.0, description="[N/m]")
@@ -93,11 +86,11 @@ class Hand(Section):
     )
 
 
-class Leg(Section):
+class LegKeys(Section):
     """One leg of the wished path, from rest to rest."""
 
-    to: Vector3 = Field((0.0, 0.0, 0.0), description="[m] from where the tool starts, base axes")
-    turn: Vector3 = Field(
+    to: Vector = Field((0.0, 0.0, 0.0), description="[m] from where the tool starts, base axes")
+    turn: Vector = Field(
         (0.0, 0.0, 0.0), description="[rad] rotation vector from where it starts, base axes"
     )
     speed: Positive = Field(description="[m/s] at most")
@@ -106,7 +99,7 @@ class Leg(Section):
     wait: NonNegative = Field(0.1, description="[s] at its end")
 
 
-class Playback(Section):
+class PlaybackKeys(Section):
     """How what was taught is cleaned and run."""
 
     tolerance: Positive = Field(0.001, description="[m] smoothing moves the tool by at most this")
@@ -119,7 +112,7 @@ class Playback(Section):
     )
 
 
-class Arm(Section):
+class ArmKeys(Section):
     """What the simulated arm is like, and what it is allowed."""
 
     payload: NonNegative = Field(0.0, description="[kg] more, at the tool")
@@ -127,74 +120,3 @@ class Arm(Section):
     command_share: Share = Field(
         0.7, description="of the guard's acceleration bounds that commands may use"
     )
-
-
-class WalkScenario(Scenario):
-    """A painting arm that a simulated operator guides by hand, watched by the guard."""
-
-    kind: Literal["walkthrough"]
-    duration: Positive = Field(120.0, description="[s] at most, of teaching")
-    goal: Goal = Field(default_factory=lambda: Goal(offset=(0.0, 0.0, 0.0)))
-    skin: Skin = Field(default_factory=lambda: Skin.model_construct(rings=(), sensor=Sensor()))
-    guard: Guard
-    legs: tuple[Leg, ...] = Field(alias="leg", min_length=1, description="the wished path")
-    hand: Hand = Field(default_factory=Hand)
-    admittance: Admittance = Field(default_factory=Admittance)
-    arm: Arm = Field(default_factory=Arm)
-    playback: Playback = Field(default_factory=Playback)
-    hand_guiding_speed: Positive = Field(
-        0.25, description="[m/s] of the hand-guiding rules: the preset that teaching is compared to"
-    )
-    magnified: tuple[float, ...] | None = Field(
-        None, min_length=2, max_length=2, description="[s] of the figure's window; none: the stop's"
-    )
-
-    ratings: str | None = Field(
-        None, description="CSV of testers' ratings, 0 to 10, a column an indicator: drawn as Fig. 9"
-    )
-
-    @model_validator(mode="before")
-    @classmethod
-    def _nothing_else(cls, table: Any) -> Any:
-        if isinstance(table, dict) and (given := [key for key in _OTHERS if key in table]):
-            raise ValueError(f"{', '.join(given)}: a walk-through has no such table")
-        return table
-
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
-        if self.magnified is not None and self.magnified[0] >= self.magnified[1]:
-            raise ValueError(f"magnified = {list(self.magnified)}: the first must be the earlier")
-        return self
-
-    def to_toml(self) -> str:
-        """The file that gives this scenario again, with every default of its own written out."""
-        return toml.write(
-            {k: v for k, v in self.model_dump(by_alias=True).items() if k not in _OTHERS}
-        )
-
-    def slow(self) -> WalkScenario:
-        """The same path under the hand-guiding rules: bound and wishes at that speed."""
-        most = self.hand_guiding_speed
-        guard = self.guard.model_copy(update={"tcp_speed": most})
-        legs = tuple(
-            leg.model_copy(update={"speed": min(leg.speed, _SLOW_SHARE * most)})
-            for leg in self.legs
-        )
-        return self.model_copy(update={"guard": guard, "legs": legs})
-
-
-class GuidedScenario(Scenario):
-    """An arm with sensors that a hand guides, while its body keeps away from what they see.
-
-    The twist that the hand asks for enters the stack as the reach levels' goal, ahead of the tool
-    by that twist over `controller.reach_gain`: their rate, gain times what is left, is that twist.
-    """
-
-    kind: Literal["guided"]
-    goal: Goal = Field(default_factory=lambda: Goal(offset=(0.0, 0.0, 0.0)))
-    legs: tuple[Leg, ...] = Field(alias="leg", min_length=1, description="the wished path")
-    hand: Hand = Field(default_factory=Hand)
-    admittance: Admittance = Field(default_factory=Admittance)
-
-
-_SLOW_SHARE = 0.9  # of the bound that an operator dares: as 1.17 m/s of 1.30

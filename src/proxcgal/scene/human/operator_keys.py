@@ -7,7 +7,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from proxcgal.scenario.keys import Count, NonNegative, Positive, Section, Vector
+from proxcgal.core.schema import Count, NonNegative, Positive, Section, Vector
 
 Mark = Annotated[tuple[float, ...], Field(min_length=2, max_length=2)]
 

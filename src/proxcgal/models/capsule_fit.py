@@ -1,4 +1,4 @@
-"""Capsules for links: as a mesh, and the other way round, fitted to one so that it lies inside."""
+"""Capsules fitted to links, so that each link lies inside of its own."""
 
 from __future__ import annotations
 
@@ -7,44 +7,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from proxcgal._core import Capsule, LinkCapsule
-from proxcgal.core.typing import Array, Ints
+from proxcgal.core.transforms import axes_along
+from proxcgal.core.typing import Array
 
 if TYPE_CHECKING:
     from proxcgal.models.robots import Robot
 
-SEGMENTS, RINGS = 32, 8  # round the axis, and from the rim of a cap to its pole
 _ROUNDING = 1e-12  # [m] by which a fitted radius is widened, so that no vertex is outside by a bit
+_UP = (0.0, 0.0, 1.0)  # an axis where there is none
 _TINY = 1e-300  # stands in for the square of no length
 _STEPS = (0.3, 0.1, 0.03, 0.01, 0.003, 0.001)  # of the search: share of the mesh's size, and [rad]
-
-
-def capsule_mesh(start: Array, end: Array, radius: float) -> tuple[Array, Ints]:
-    """A closed surface of a capsule: vertices (v, 3) [m], all on it, and triangles (f, 3)."""
-    frame = _frame(end - start)
-    latitude = np.linspace(0.0, np.pi / 2, RINGS + 1)[:-1]
-    turn = 2 * np.pi * np.arange(SEGMENTS) / SEGMENTS
-    circle = np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    rows = [(start, -np.sin(a), np.cos(a)) for a in latitude[::-1]]
-    rows += [(end, np.sin(a), np.cos(a)) for a in latitude]
-    if not np.any(start != end):  # a sphere: its rim stands once
-        rows.pop(RINGS)
-    rings = [
-        middle + radius * (high * frame[2] + wide * circle @ frame[:2])
-        for middle, high, wide in rows
-    ]
-    poles = np.stack([start - radius * frame[2], end + radius * frame[2]])
-    vertices = np.concatenate([*rings, poles])
-    here = np.arange(SEGMENTS)
-    there = (here + 1) % SEGMENTS
-    low, high = len(vertices) - 2, len(vertices) - 1
-    triangles = [np.stack([np.full(SEGMENTS, low), there, here], axis=1)]
-    for ring in range(len(rings) - 1):
-        a, b = ring * SEGMENTS + here, ring * SEGMENTS + there
-        c, d = a + SEGMENTS, b + SEGMENTS
-        triangles += [np.stack([a, b, d], axis=1), np.stack([a, d, c], axis=1)]
-    last = (len(rings) - 1) * SEGMENTS
-    triangles.append(np.stack([np.full(SEGMENTS, high), last + here, last + there], axis=1))
-    return vertices, np.concatenate(triangles).astype(np.int32)
 
 
 def fit_capsules(robot: Robot) -> list[LinkCapsule]:
@@ -96,7 +68,7 @@ def _improved(points: Array, middle: Array, axis: Array, size: float) -> _Fit:
         moved = True
         while moved:
             moved = False
-            across = _frame(axis)[:2]
+            across = axes_along(axis, _UP)[1:]
             for side in (*across, *-across):
                 for other, direction in (
                     (middle + step * size * side, axis), (middle, axis + step * side)
@@ -120,13 +92,3 @@ def _around(points: Array, middle: Array, axis: Array) -> _Fit:
         low = high = 0.5 * (low + high)
     volume = np.pi * radius**2 * (high - low + 4 / 3 * radius)
     return volume, middle + low * axis, middle + high * axis, radius
-
-
-def _frame(axis: Array) -> Array:
-    """(3, 3) rows of a right-handed frame, the last along the axis; upright for none."""
-    length = np.linalg.norm(axis)
-    z = axis / length if length > 0 else np.array([0.0, 0.0, 1.0])
-    helper = np.eye(3)[int(np.abs(z).argmin())]
-    x = np.cross(helper, z)
-    x /= np.linalg.norm(x)
-    return np.stack([x, np.cross(z, x), z])
