@@ -54,7 +54,7 @@ ROOMS = (
     "study", "devices", "viewer", "server", "report", "cli",
 )  # fmt: skip
 MOST_FILES = 25  # of a room
-ONLY_IN = {"mujoco": ("sim", "models.mjcf"), "viser": ("viewer",)}
+ONLY_IN = {"mujoco": ("sim",), "viser": ("viewer",)}
 
 
 def cpp_files(*folders: str) -> list[Path]:
