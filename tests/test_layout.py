@@ -13,7 +13,7 @@ ROOMS = (
     "study", "devices", "viewer", "server", "report", "cli",
 )  # fmt: skip
 MOST_FILES = 25  # of a room
-ONLY_IN = {"mujoco": ("sim", "models.mjcf"), "viser": ("viewer",)}
+ONLY_IN = {"mujoco": ("sim",), "viser": ("viewer",)}
 
 
 @pytest.fixture(scope="module")

@@ -112,7 +112,7 @@ def test_a_mount_fault_moves_only_its_sensor_and_only_for_its_time(setup: Setup)
     fault = Fault.model_validate(
         {"kind": "mount_offset", "sensor": 3, "from": 1.0, "to": 2.0, "value": 0.02}
     )
-    real = RealMounts(setup.skin.mounts, [fault], seed=4)
+    real = RealMounts(setup.robot, setup.skin.mounts, [fault], seed=4)
     right = np.array([mount.T_LS for mount in setup.skin.mounts])
     np.testing.assert_array_equal(real.at(0.5), right)
     np.testing.assert_array_equal(real.at(2.0), right)
@@ -123,9 +123,9 @@ def test_a_mount_fault_moves_only_its_sensor_and_only_for_its_time(setup: Setup)
 
 def test_a_turned_mount_stays_a_pose(setup: Setup) -> None:
     fault = Fault.model_validate({"kind": "mount_turn", "sensor": "all", "value": 0.3})
-    for T_LS, mount in zip(
-        RealMounts(setup.skin.mounts, [fault], 1).at(0.0), setup.skin.mounts, strict=True
-    ):
+    mounts = setup.skin.mounts
+    turned = RealMounts(setup.robot, mounts, [fault], 1).at(0.0)
+    for T_LS, mount in zip(turned, mounts, strict=True):
         by = np.asarray(mount.T_LS)[:3, :3].T @ T_LS[:3, :3]
         np.testing.assert_allclose(by @ by.T, np.eye(3), atol=1e-12)
         assert np.arccos((np.trace(by) - 1.0) / 2.0) == pytest.approx(0.3)

@@ -70,10 +70,7 @@ class SimulatedSource:
         turns = np.arange(sensors) / sensors if settings.stagger else np.zeros(sensors)
         self._phase: Array = turns / settings.sensor_hz
         self._scans = np.zeros(sensors, np.int64)
-        links = list(setup.robot.link_names)
-        mounts = setup.skin.mounts
-        self._links = np.array([links.index(mount.link) for mount in mounts], np.intp)
-        self._mounts = RealMounts(mounts, setup.scenario.faults, seed)
+        self._mounts = RealMounts(setup.robot, setup.skin.mounts, setup.scenario.faults, seed)
         #: (sensors, 64) true where the last scan really saw the robot itself.
         self.saw_robot: Bools = np.zeros((sensors, ZONES), bool)
 
@@ -85,7 +82,7 @@ class SimulatedSource:
     def standing(self, scans: int) -> list[_core.Scan]:
         """What every sensor would send before the run, the arm at rest where it starts."""
         assert self._world is not None
-        rows = list(range(len(self._links)))
+        rows = list(range(len(self._scans)))
         hits = self._cast(rows, 0.0, self._setup.q0)
         sent = []
         for index in range(_BEFORE, _BEFORE + scans):
@@ -136,6 +133,6 @@ class SimulatedSource:
         """What the rays of some sensors meet, from where these really are."""
         assert self._world is not None
         self._world.place(q, time)
-        T_WS = self._setup.robot.link_poses(q)[self._links[rows]] @ self._mounts.at(time)[rows]
+        T_WS = self._mounts.poses_W(q, time, rows)
         directions_W = self._ranges.rays_S @ np.swapaxes(T_WS[:, :3, :3], 1, 2)
         return self._world.cast(T_WS[:, :3, 3], directions_W, self._mounting)
