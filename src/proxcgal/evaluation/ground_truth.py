@@ -13,7 +13,7 @@ import numpy as np
 from proxcgal import _core
 from proxcgal.core.transforms import inverse, placed
 from proxcgal.core.typing import Array
-from proxcgal.models.surfaces import Surfaces, moved
+from proxcgal.models.surfaces import Surfaces, most_moved
 
 if TYPE_CHECKING:
     from proxcgal.models.robots import Robot
@@ -97,7 +97,7 @@ class _SceneDistance:
         T_OL = self._T_OW[solids] @ poses_W[links]
         sweep = self._surfaces.sweep(links, T_OL)
         if self._sweep is not None:
-            self._at_least -= moved(self._sweep, sweep)
+            self._at_least -= most_moved(self._sweep, sweep)
         self._sweep = sweep
         best = _Nearest()
         for row in np.argsort(self._at_least):
