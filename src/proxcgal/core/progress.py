@@ -31,7 +31,7 @@ class ProgressBar(Closing):
         self._quiet = quiet
         self._bar: Any = None
         if not quiet and sys.stderr.isatty():
-            from tqdm import tqdm
+            from tqdm import tqdm  # here, because most runs draw no bar
 
             shape = "{l_bar}{bar}| {n:.0f}/{total:.0f} {unit} [{elapsed}, {remaining} left]"
             self._bar = tqdm(

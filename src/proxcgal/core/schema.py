@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any
 
+import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from proxcgal import _core
@@ -38,7 +39,7 @@ def like(
 
     def default() -> Any:
         value = getattr(getattr(_core, struct)(), attribute)
-        return tuple(value) if isinstance(value, list) else value
+        return tuple(np.asarray(value).tolist()) if isinstance(value, list | np.ndarray) else value
 
     return Field(default_factory=default, description=description, ge=ge, le=le, lt=lt)
 

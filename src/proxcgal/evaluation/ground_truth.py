@@ -14,7 +14,7 @@ from proxcgal import _core
 from proxcgal.core.transforms import inverse, placed
 from proxcgal.core.typing import Array
 from proxcgal.models.robots import Robot
-from proxcgal.models.surfaces import Surfaces, moved
+from proxcgal.models.surfaces import Surfaces, most_moved
 from proxcgal.scene.obstacles import Scene
 
 #: Looked for beyond the least distance so far, so that a far pair is not asked at every tick [m].
@@ -95,7 +95,7 @@ class _SceneDistance:
         T_OL = self._T_OW[solids] @ poses_W[links]
         sweep = self._surfaces.sweep(links, T_OL)
         if self._sweep is not None:
-            self._at_least -= moved(self._sweep, sweep)
+            self._at_least -= most_moved(self._sweep, sweep)
         self._sweep = sweep
         best = _Nearest()
         for row in np.argsort(self._at_least):

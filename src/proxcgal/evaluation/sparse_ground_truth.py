@@ -16,7 +16,7 @@ from proxcgal.core.transforms import inverse
 from proxcgal.core.typing import Array, Bools
 from proxcgal.evaluation.ground_truth import AHEAD_M, solid_distance
 from proxcgal.models.robots import Robot
-from proxcgal.models.surfaces import Surfaces, moved
+from proxcgal.models.surfaces import Surfaces, most_moved
 from proxcgal.scene.obstacles import Scene
 from proxcgal.scene.solids import Solid
 
@@ -138,7 +138,7 @@ class _Pairs:
             found = solid_distance(self._trees[row], self._rounding[row], other, T_AB, bound)[0]
             distance = min(found, bound)
             sweep, known = self._sweeps[row], self._at_least[row, ticks]
-            nearer = distance - moved(sweep[tick : tick + 1], sweep[ticks])
+            nearer = distance - most_moved(sweep[tick : tick + 1], sweep[ticks])
             np.maximum(known, nearer, out=known)
             if distance < best:
                 best, nearest = distance, int(row)

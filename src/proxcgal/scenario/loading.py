@@ -95,18 +95,20 @@ def _built_in() -> list[Path]:
 
 def _anchor(table: dict[str, Any], folder: Path) -> None:
     """Paths in a file are relative to that file, wherever it is read from."""
-    robot = table.get("robot")
-    if isinstance(robot, str) and is_robot_file(robot):
-        table["robot"] = str((folder / robot).absolute())
-    ratings = table.get("ratings")
-    if isinstance(ratings, str):
-        table["ratings"] = str((folder / ratings).absolute())
-    operator = table.get("operator")
-    if isinstance(operator, dict) and isinstance(operator.get("recording"), str):
-        operator["recording"] = str((folder / operator["recording"]).absolute())
+
+    def anchored(place: str) -> str:
+        return str((folder / place).absolute())
+
+    for owner, key in ((table, "robot"), (table, "ratings"), (table.get("operator"), "recording")):
+        if (
+            isinstance(owner, dict)
+            and isinstance(place := owner.get(key), str)
+            and (key != "robot" or is_robot_file(place))
+        ):
+            owner[key] = anchored(place)
     places = table.get("package_dirs")
     if isinstance(places, list) and all(isinstance(place, str) for place in places):
-        table["package_dirs"] = [str((folder / place).absolute()) for place in places]
+        table["package_dirs"] = [anchored(place) for place in places]
 
 
 def _tuples(value: Any) -> Any:

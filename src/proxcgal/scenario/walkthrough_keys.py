@@ -2,21 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import Field
 
-from proxcgal import _core
-from proxcgal.core.schema import NonNegative, Positive, Section, Share, Vector
+from proxcgal.core.schema import NonNegative, Positive, Section, Share, Vector, like
 
 Vector6 = Annotated[tuple[float, ...], Field(min_length=6, max_length=6)]
-
-
-def _admittance(attribute: str, description: str) -> Any:
-    """A field whose default is that of the core."""
-    value = getattr(_core.AdmittanceConfig(), attribute)
-    plain = float(value) if isinstance(value, float) else tuple(float(v) for v in value)
-    return Field(plain, description=description)
 
 
 class HumanKeys(Section):
@@ -62,12 +54,12 @@ class GuardKeys(Section):
 class AdmittanceKeys(Section):
     """M a + D v = F: three linear and three angular axes, in the base frame."""
 
-    mass: Vector6 = _admittance("mass", "[kg], [kg m^2] M")
-    damping: Vector6 = _admittance("damping", "[N s/m], [N m s/rad] D")
-    dead_band: Vector6 = _admittance("dead_band", "[N], [N m]")
-    max_force: Vector6 = _admittance("max_force", "[N], [N m]")
-    engage_time: NonNegative = _admittance(
-        "engage_time", "[s] in which the hand is let in, and let go"
+    mass: Vector6 = like("AdmittanceConfig", "mass", "[kg], [kg m^2] M")
+    damping: Vector6 = like("AdmittanceConfig", "damping", "[N s/m], [N m s/rad] D")
+    dead_band: Vector6 = like("AdmittanceConfig", "dead_band", "[N], [N m]")
+    max_force: Vector6 = like("AdmittanceConfig", "max_force", "[N], [N m]")
+    engage_time: NonNegative = like(
+        "AdmittanceConfig", "engage_time", "[s] in which the hand is let in, and let go"
     )
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
+import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from proxcgal.core.cache import Cache
-from proxcgal.core.errors import ModelError
+from proxcgal.core.errors import ModelError, ProxError
 from proxcgal.models.description import RobotDescription
 from proxcgal.models.formats import mjcf, urdf
 from proxcgal.models.formats.capsule_robot import read_capsule_robot
@@ -53,30 +54,30 @@ def read_description(
     if (stored := cache.get(key)) is not None and (found := description_from(stored)):
         return found
     root = parse_xml(path, {"robot", "mujoco"})
-    if root.tag == "mujoco":
-        description, files = _read_mjcf(root, path, folders, base)
-    else:
-        description, files = _read_urdf(root, path, folders, base)
+    read = _read_mjcf if root.tag == "mujoco" else _read_urdf
+    try:
+        description, files = read(root, path, folders, base)
+    except ProxError:
+        raise
+    except (ValueError, RuntimeError) as error:  # of pinocchio
+        raise ModelError(f"{path}: {error}") from None
     cache.put(key, description_to(description, [path, *files]))
     return description
 
 
 def _read_urdf(
-    root: Any, path: Path, folders: MeshFolders, base: str | None
+    root: ET.Element, path: Path, folders: MeshFolders, base: str | None
 ) -> tuple[RobotDescription, list[Path]]:
+    import pinocchio as pin  # here, because a warm cache does without it
+
     files: list[Path] = []
     if path.suffix.lower() == ".xacro":
         root, files = _expand(path, folders)
     urdf.check_structure(root, path)
     shapes = urdf.shapes(root, folders)
-    import pinocchio as pin  # here, because a warm cache does without it
-
-    try:
-        model = pin.buildModelFromXML(urdf.kinematics_only(root))
-    except (ValueError, RuntimeError) as error:
-        raise ModelError(f"{path}: {error}") from None
-    children = {joint.find("child").get("link") for joint in root.findall("joint")}
-    first = next(e.get("name") for e in root.findall("link") if e.get("name") not in children)
+    model = pin.buildModelFromXML(urdf.kinematics_only(root))
+    children = {end.get("link") for end in root.findall("joint/child")}
+    first = next(e.get("name", "") for e in root.findall("link") if e.get("name") not in children)
     files += [part.file for parts in shapes.values() for part in parts if part.file]
     description = describe(
         model,
@@ -91,21 +92,15 @@ def _read_urdf(
 
 
 def _read_mjcf(
-    root: Any, path: Path, folders: MeshFolders, base: str | None
+    root: ET.Element, path: Path, folders: MeshFolders, base: str | None
 ) -> tuple[RobotDescription, list[Path]]:
-    files = mjcf.check_structure(root, path, folders)
-    import pinocchio as pin
+    import pinocchio as pin  # here, because a warm cache does without it
 
-    try:
-        model = pin.buildModelFromMJCF(str(path))
-        shapes = mjcf.shapes(model, path, root)
-    except (ValueError, RuntimeError) as error:
-        if isinstance(error, ModelError):
-            raise
-        raise ModelError(f"{path}: {error}") from None
+    files = mjcf.check_structure(root, path, folders)
+    model = pin.buildModelFromMJCF(str(path))
     description = describe(
         model,
-        shapes,
+        mjcf.shapes(model, path, root),
         name=root.get("model") or path.stem,
         source=path,
         base=base or _default_base(model, WORLD),
@@ -120,14 +115,12 @@ def _default_base(model: Any, otherwise: str) -> str:
     return "base_link" if fixed else otherwise
 
 
-def _expand(path: Path, folders: MeshFolders) -> tuple[Any, list[Path]]:
+def _expand(path: Path, folders: MeshFolders) -> tuple[ET.Element, list[Path]]:
     """The URDF that a xacro makes, and the files it was made from.
 
     A xacro is a program: it can read files that it names. Only those that one trusts are for use.
     """
-    import xml.etree.ElementTree as ET
-
-    import xacro  # type: ignore[import-untyped]
+    import xacro  # type: ignore[import-untyped]  # here, for those files only
     from xacrodoc import XacroDoc, packages
 
     known = {folder.name: folder for folder in folders.package_dirs}

@@ -144,7 +144,7 @@ def shapes(model: Any, path: Path, root: ET.Element) -> dict[str, list[Shape]]:
     Raises:
         ModelError: a shape that is not read; a body that pinocchio has lost.
     """
-    import pinocchio as pin
+    import pinocchio as pin  # here, because a warm cache does without it
 
     bodies = {f.name for f in model.frames if f.type == pin.FrameType.BODY}
     if lost := [b.get("name", "") for b in root.iter("body") if b.get("name") not in bodies]:

@@ -71,7 +71,9 @@ class MeshFolders:
         folders = [*self.own, *self.package_dirs, *self.packages.values()]
         if not any(path.is_relative_to(folder) for folder in folders):
             self._outside(name, what, path, folders)
-        return self._existing(path, name, what)
+        if not path.is_file():
+            raise ModelError(f"{self.description}: no mesh file '{name}' of {what} at {path}")
+        return path
 
     def _in_package(self, name: str, what: str) -> Path:
         package, _, rest = name.split("://", 1)[1].partition("/")
@@ -92,11 +94,6 @@ class MeshFolders:
             f"'{package}' in {', '.join(str(p) for p in tried[:4]) or 'no folder'}. "
             "package_dirs names the folders that packages lie in"
         )
-
-    def _existing(self, path: Path, name: str, what: str) -> Path:
-        if not path.is_file():
-            raise ModelError(f"{self.description}: no mesh file '{name}' of {what} at {path}")
-        return path
 
     def _outside(self, name: str, what: str, path: Path, folders: Sequence[Path]) -> None:
         allowed = ", ".join(str(folder) for folder in folders)

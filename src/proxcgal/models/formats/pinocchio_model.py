@@ -150,7 +150,7 @@ def _joint(
     source: Path,
 ) -> Joint:
     """One joint of pinocchio's model; `placed` brings what hangs on the universe to the base."""
-    import pinocchio as pin
+    import pinocchio as pin  # as in `describe`
 
     name, kind, parent = model.names[row], model.joints[row], model.parents[row]
     if kind.nv != 1:

@@ -35,8 +35,6 @@ def parse_xml(path: Path, roots: Collection[str]) -> ET.Element:
         ModelError: it cannot be read, is not well-formed, declares a document type or an entity,
             or goes past the bounds on size, depth and number of elements.
     """
-    if (size := _size(path)) > MAX_BYTES:
-        raise ModelError(f"{path}: {size} bytes; at most {MAX_BYTES} are read")
     builder = ET.TreeBuilder()
     parser = expat.ParserCreate()
     depth = count = 0
@@ -70,6 +68,8 @@ def parse_xml(path: Path, roots: Collection[str]) -> ET.Element:
     parser.StartDoctypeDeclHandler = doctype
     parser.EntityDeclHandler = doctype
     try:
+        if (size := path.stat().st_size) > MAX_BYTES:
+            raise ModelError(f"{path}: {size} bytes; at most {MAX_BYTES} are read")
         with path.open("rb") as file:
             while chunk := file.read(_CHUNK):
                 parser.Parse(chunk, False)
@@ -79,13 +79,6 @@ def parse_xml(path: Path, roots: Collection[str]) -> ET.Element:
     except OSError as error:
         raise ModelError(f"{path}: cannot be read: {error.strerror}") from None
     return builder.close()
-
-
-def _size(path: Path) -> int:
-    try:
-        return path.stat().st_size
-    except OSError as error:
-        raise ModelError(f"{path}: cannot be read: {error.strerror}") from None
 
 
 def parse_number(text: str, what: str, most: float = FARTHEST) -> float:

@@ -48,6 +48,11 @@ class Subject:
     left_handed: bool = False
 
     @property
+    def side(self) -> float:
+        """Of the reaching hand: 1 left, -1 right."""
+        return 1.0 if self.left_handed else -1.0
+
+    @property
     def upper_arm(self) -> float:
         """Shoulder to elbow [m]."""
         return self.arm_length * UPPER_ARM / ARM
