@@ -1,7 +1,5 @@
 """Arrays kept on disk between runs, found by what they were made from."""
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import io

@@ -1,7 +1,5 @@
 """How far the work is: a bar on a terminal, a line per finished piece elsewhere."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Sequence
 from typing import Any

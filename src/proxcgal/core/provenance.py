@@ -1,7 +1,5 @@
 """Where results come from: versions and files of this build, commit, machine, command."""
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import importlib.metadata

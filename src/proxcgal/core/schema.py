@@ -1,7 +1,5 @@
 """Tables of a file that users write: strict types, bounds, and defaults of the C++ core."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Any
 

@@ -1,7 +1,5 @@
 """Tables and numbers for a reader."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from proxcgal.core.files import NOTHING_M

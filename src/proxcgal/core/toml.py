@@ -1,7 +1,5 @@
 """TOML in and out: dotted overrides, and a writer for what the standard library only reads."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -3,8 +3,6 @@
 Rotations are (3, 3) matrices R_WO, poses (4, 4) matrices T_WO that map frame O to frame W.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """The space round the arm that no sensor sees, and for how long none has."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

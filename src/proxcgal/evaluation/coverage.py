@@ -1,7 +1,5 @@
 """What the sensors had in view of what mattered: the truly closest points of a run."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Literal

@@ -4,8 +4,6 @@ For the evaluation only; no controller ever sees them. What is skipped is skippe
 proves it: between two postures a distance shrinks by no more than the two surfaces moved.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

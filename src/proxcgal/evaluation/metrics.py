@@ -1,7 +1,5 @@
 """The numbers of `summary.json`, and files that are whole or not there."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -4,8 +4,6 @@ A distance between two postures changes by no more than the surfaces moved. What
 no new least and no violation is not asked: least values, counts and what is asked are exact.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Finds the task that blocks progress, its link, and the obstacle."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """When a run is over: the goal reached, or no progress towards it for too long."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

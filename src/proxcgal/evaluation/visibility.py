@@ -1,7 +1,5 @@
 """Which points of space the sensors have in view, whatever they measure there."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from proxcgal.core.typing import Array, Bools

@@ -1,7 +1,5 @@
 """One chain out of two, and bodies put on a link."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import replace
 

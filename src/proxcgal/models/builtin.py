@@ -1,7 +1,5 @@
 """The robots that are known by name, and where their data comes from."""
 
-from __future__ import annotations
-
 import functools
 import importlib.util
 from collections.abc import Callable

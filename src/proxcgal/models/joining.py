@@ -1,7 +1,5 @@
 """Two robots' descriptions made one chain."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Robots: from a name or a file to what the controller and the simulator use."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,7 +1,5 @@
 """What sensors must see of the arm itself: their rays against its full-resolution links."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

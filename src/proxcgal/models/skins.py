@@ -1,7 +1,5 @@
 """Sensor layouts: rings of sensors round a link, on its own surface."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Literal
 

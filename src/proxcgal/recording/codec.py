@@ -5,8 +5,6 @@ text would cost more than the tick. Python writes floats so that they read back 
 JSON has no number for is written as "nan", "inf", "-inf".
 """
 
-from __future__ import annotations
-
 import base64
 import json
 import math

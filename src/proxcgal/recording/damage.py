@@ -1,7 +1,5 @@
 """Reads the records of a file up to the first damage: checksums, sequence numbers, the index."""
 
-from __future__ import annotations
-
 import io
 import json
 import zlib

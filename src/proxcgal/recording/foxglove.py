@@ -3,8 +3,6 @@
 Only the parts of the schemas that are used, under their published names and fields.
 """
 
-from __future__ import annotations
-
 import base64
 import json
 import math

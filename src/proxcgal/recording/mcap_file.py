@@ -1,7 +1,5 @@
 """An MCAP file whose messages survive `kill -9`: no chunks, and a flush after every message."""
 
-from __future__ import annotations
-
 import json
 import warnings
 import zlib

@@ -1,7 +1,5 @@
 """Reads a recording back: every tick up to the first damage, and where that is."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Pictures of a recorded run: the arm, what it senses, and the closest pair as an arrow."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A recording's inputs, given to a controller again."""
 
-from __future__ import annotations
-
 import time as clock
 import warnings
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """Records a simulated run: every tick, and at the sensors' rate what pictures and Foxglove draw."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from proxcgal.core.typing import Array

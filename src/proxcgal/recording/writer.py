@@ -4,8 +4,6 @@ A flush after every tick: what was acknowledged survives `kill -9`. Every tick h
 the whole file before it, so that damage is found, wherever it is, and reported.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import zlib

@@ -1,7 +1,5 @@
 """The keys of a scenario's `[controller]`: tasks, filter, solver, monitor."""
 
-from __future__ import annotations
-
 from typing import Literal, Self
 
 from pydantic import Field, model_validator

@@ -1,7 +1,5 @@
 """The keys of a scenario's `[[fault]]`: what goes wrong, when, and by how much."""
 
-from __future__ import annotations
-
 import math
 from typing import Literal, NamedTuple, Self
 

@@ -1,7 +1,5 @@
 """The keys of a scenario's `[goal]` and `[finish]`: where the tool goes, when a run is over."""
 
-from __future__ import annotations
-
 from typing import Self
 
 from pydantic import Field, model_validator

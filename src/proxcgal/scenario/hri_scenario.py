@@ -1,7 +1,5 @@
 """Scenarios with a person beside the arm, whose keys stand under `[operator]`."""
 
-from __future__ import annotations
-
 from proxcgal.scenario.scenario import Scenario
 from proxcgal.scene.human.operator_keys import Operator
 from proxcgal.scene.human.person import Person, person_of

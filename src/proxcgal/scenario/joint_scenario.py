@@ -1,7 +1,5 @@
 """Scenarios of a macro-micro robot: named initial configurations, a goal, and when a run ends."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Literal, Self
 

@@ -1,7 +1,5 @@
 """Scenario files: one TOML file says what is simulated; every problem in it is reported at once."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path

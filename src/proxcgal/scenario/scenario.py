@@ -1,7 +1,5 @@
 """A scenario file: its top-level keys, `[limits]`, and what all kinds of scenario have."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from pydantic import Field

@@ -1,7 +1,5 @@
 """From a scenario to what runs: robot, sensors, controller settings, start and goal."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Self

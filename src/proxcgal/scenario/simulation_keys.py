@@ -1,7 +1,5 @@
 """The keys of a scenario's `[simulation]`: rates, and what the simulated sensors really do."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from pydantic import Field

@@ -1,7 +1,5 @@
 """The keys of a scenario's `[skin]`: rings of sensors, and their model."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Literal
 

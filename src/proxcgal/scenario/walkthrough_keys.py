@@ -1,7 +1,5 @@
 """The keys of a walk-through: `[guard]`, `[[leg]]`, `[hand]`, `[admittance]`, `[playback]`, ..."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from pydantic import Field

@@ -1,7 +1,5 @@
 """A hand that is moved takes its arm along, which bounds how far it goes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

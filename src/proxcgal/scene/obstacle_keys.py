@@ -1,7 +1,5 @@
 """The keys of a scenario's `[[obstacle]]`: shape, place and path of a solid."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import Annotated, Literal, Self
 

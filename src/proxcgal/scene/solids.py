@@ -4,8 +4,6 @@ Axis z, origin at the centre, metres. The surface is all that lies `rounding` fr
 triangles: a capsule is its axis, rounded.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

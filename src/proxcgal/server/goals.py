@@ -3,8 +3,6 @@
 Source: [JR] 3.2.1 and 4.1.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

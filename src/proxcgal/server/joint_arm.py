@@ -1,7 +1,5 @@
 """The 12-joint arm, simulated: a source of the common loop that follows one goal after another."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -4,8 +4,6 @@ The arm is simulated: it follows its velocity commands exactly, under the scenar
 points of the scene itself. Source: [JR] 3.2.1 (action server) and 4.1 (goals).
 """
 
-from __future__ import annotations
-
 import math
 import threading
 import time as clock

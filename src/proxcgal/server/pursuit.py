@@ -1,7 +1,5 @@
 """How the 12-joint arm pursues a goal, tick by tick, and why that ends."""
 
-from __future__ import annotations
-
 import threading
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The arm's motion between two ticks: it follows its velocity commands exactly."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from proxcgal.core.typing import Array

@@ -1,7 +1,5 @@
 """What the body filter made of the sensors' points, as pictures need it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Self
 

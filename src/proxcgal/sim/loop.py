@@ -1,7 +1,5 @@
 """The one way through: source -> injected faults -> tick; the caller records."""
 
-from __future__ import annotations
-
 import time as clock
 from collections.abc import Callable, Iterator
 from itertools import count

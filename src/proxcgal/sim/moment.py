@@ -1,7 +1,5 @@
 """One moment of a run as a page draws it: plain arrays, without the controller behind them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Self
 

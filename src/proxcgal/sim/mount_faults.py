@@ -1,7 +1,5 @@
 """Where the simulated sensors really sit: injected mount faults."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -5,8 +5,6 @@ torque, with a model that is a little wrong; once the torque is off, brakes clos
 the joints, after the time that theirs take.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

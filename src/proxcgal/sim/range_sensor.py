@@ -4,8 +4,6 @@ Every draw belongs to (seed, scan index, sensor, zone), never to the order of ca
 controllers that run the same scene with the same seed meet the same noise.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Where a tick's inputs come from: simulated sensors on a simulated arm, or a recording."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Protocol
 

@@ -1,7 +1,5 @@
 """What all sensors see of a scene, from a robot that stands still."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any, Self
 

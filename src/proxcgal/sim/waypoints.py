@@ -1,7 +1,5 @@
 """Where the tool is sent, tick by tick: one goal, or way points back and forth."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -8,8 +8,6 @@ velocity commands exactly and the scene its paths, so poses are set, and rays an
 at them.
 """
 
-from __future__ import annotations
-
 import copy
 import ctypes
 import os

@@ -1,7 +1,5 @@
 """The parts of a trial: those of any simulated run, with a hand at the tool where one guides."""
 
-from __future__ import annotations
-
 from proxcgal.scenario.setup import Setup
 from proxcgal.scenario.walkthrough_scenario import GuidedScenario
 from proxcgal.sim.assembly import Assembly

@@ -3,8 +3,6 @@
 The same way through as every trial: source -> injected faults -> tick.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """One run, one way through: source -> injected faults -> tick -> recorder."""
 
-from __future__ import annotations
-
 import time as clock
 from collections.abc import Sequence
 from dataclasses import replace

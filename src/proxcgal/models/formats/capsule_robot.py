@@ -1,7 +1,5 @@
 """Robots given as a list of capsules in a TOML file: links, joints, and what physics needs."""
 
-from __future__ import annotations
-
 import math
 import tomllib
 from functools import cached_property

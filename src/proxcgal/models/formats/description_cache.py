@@ -1,7 +1,5 @@
 """A description as cache entry, with the files it was read from."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """From a URDF, xacro or MJCF file to a description, by way of the cache."""
 
-from __future__ import annotations
-
 import os
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence

@@ -4,8 +4,6 @@ pinocchio reads the kinematics. It passes over in silence what it does not know 
 the top, frames, switched-off limits), so all of that is looked for first, and refused by name.
 """
 
-from __future__ import annotations
-
 import math
 import xml.etree.ElementTree as ET
 from pathlib import Path

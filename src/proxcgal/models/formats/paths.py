@@ -1,7 +1,5 @@
 """Where the mesh files of a description lie, and that they lie where they may."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path

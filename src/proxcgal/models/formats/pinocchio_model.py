@@ -1,7 +1,5 @@
 """From pinocchio's model and the links' shapes to a description, for URDF and MJCF alike."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """XML and its numbers, from files that may be broken or hostile: refused early, never expanded."""
 
-from __future__ import annotations
-
 import math
 import xml.etree.ElementTree as ET
 from collections.abc import Collection

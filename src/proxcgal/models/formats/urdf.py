@@ -4,8 +4,6 @@ The structure is checked before pinocchio sees it, which takes a link with two p
 and returns a shorter robot. What pinocchio gets holds links and joints only.
 """
 
-from __future__ import annotations
-
 import math
 import xml.etree.ElementTree as ET
 from collections import Counter

@@ -1,7 +1,5 @@
 """Mesh files as clean triangles: welded, finite, without empty faces."""
 
-from __future__ import annotations
-
 import io
 import os
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Simple shapes as closed surfaces of triangles."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from proxcgal.core.transforms import axes_along

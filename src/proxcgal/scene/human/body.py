@@ -1,7 +1,5 @@
 """The body as capsules between points: which there are, how thick, where they stand."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

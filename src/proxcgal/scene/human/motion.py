@@ -1,7 +1,5 @@
 """What a virtual subject does on a timeline: walks, turns, leans, reaches."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The keys of a scenario's `[operator]`: who walks in, where to, and when."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Self
 

@@ -1,7 +1,5 @@
 """A person as a scene: capsules, and where they are and how they move at any time."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

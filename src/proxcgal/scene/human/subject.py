@@ -6,8 +6,6 @@ densities: Winter, anthropometric data; a capsule is as thick as the cylinder th
 segment's length and volume.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

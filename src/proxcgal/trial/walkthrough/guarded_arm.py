@@ -1,7 +1,5 @@
 """The arm of a walk-through, cycle by cycle: guard, hand guiding, weight, drives and brakes."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from proxcgal import _core

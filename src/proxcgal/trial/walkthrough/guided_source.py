@@ -1,7 +1,5 @@
 """A source of tick inputs: a hand guides the arm that its sensors keep away from obstacles."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import cast

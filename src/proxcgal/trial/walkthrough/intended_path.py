@@ -1,7 +1,5 @@
 """The path an operator has in mind, cycle by cycle."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self

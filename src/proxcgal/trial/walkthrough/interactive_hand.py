@@ -1,7 +1,5 @@
 """A hand at the tool that a user moves while the arm runs; it pulls as the operator's does."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from proxcgal.core.typing import Array

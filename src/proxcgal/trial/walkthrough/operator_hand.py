@@ -1,7 +1,5 @@
 """The operator's hand on the handle: spring and damper, bounded, trembling, slow to react."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Playing back what was taught: to its start, a check that it is there, then the path, guarded."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

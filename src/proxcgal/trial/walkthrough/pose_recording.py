@@ -3,8 +3,6 @@
 Each pose holds its own checksum, and reading gives all up to the first damage.
 """
 
-from __future__ import annotations
-
 import json
 import zlib
 from collections.abc import Mapping

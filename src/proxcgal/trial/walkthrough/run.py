@@ -1,7 +1,5 @@
 """A whole walk-through: taught, recorded, cleaned, played back; stops looked at more closely."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path

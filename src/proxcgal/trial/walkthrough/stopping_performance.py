@@ -1,7 +1,5 @@
 """How the arm stops under other brakes and in the worst posture: simulated, not assumed."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

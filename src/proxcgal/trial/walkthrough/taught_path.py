@@ -1,7 +1,5 @@
 """What was taught, made fit to be played: resampled, smoothed within a tolerance, exported."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math

@@ -1,7 +1,5 @@
 """Teaching: the hand pulls, the admittance follows, the guard watches, the arm has weight."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
