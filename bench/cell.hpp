@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "proxcgal/controller.hpp"
+#include "proxcgal/control/controller.hpp"
 
 /// One cell of the timing grid, as bench/inputs.py writes it.
 namespace proxcgal::bench {

@@ -10,6 +10,7 @@
 #include <cstdio>
 
 #include "cell.hpp"
+#include "proxcgal/pipeline/distance.hpp"
 #include "samples.hpp"
 
 namespace {

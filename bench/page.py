@@ -21,7 +21,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
 from browser import chromium, until
 
 from proxcgal.core.provenance import machine
-from proxcgal.scenario.loading import Scenario, load_scenario
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.scenario.scenario import Scenario
 from proxcgal.viewer.live_page import LivePage
 from proxcgal.viewer.messages import Update
 from proxcgal.viewer.page_server import close, serve

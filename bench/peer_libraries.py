@@ -14,7 +14,7 @@ import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
-from proxcgal.models import Robot
+from proxcgal.models.robots import Robot
 from proxcgal.study.timing.inputs import Inputs
 
 Array = NDArray[np.float64]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from peer_libraries import MIN_HIT
 
-from proxcgal.models import Robot
+from proxcgal.models.robots import Robot
 from proxcgal.study.timing.inputs import Inputs
 
 Array = NDArray[np.float64]

@@ -32,7 +32,7 @@ from peer_loops import Spheres, closest, remove_body
 from peer_tables import FOOT, HEAD, tables
 
 from proxcgal.core.errors import ModelWarning
-from proxcgal.core.progress import Progress
+from proxcgal.core.progress import ProgressBar
 from proxcgal.scenario.loading import load_scenario
 from proxcgal.study.timing.grid import ALGORITHMS, METHODS, Effort, call_of, measure
 from proxcgal.study.timing.inputs import REACH, SCENARIOS, VERTICES, Inputs, grid_inputs
@@ -125,7 +125,7 @@ def main() -> int:
     clouds = ("raw", "1m") if options.quick else tuple(REACH)
     found: list[Result] = []
     count = len(SCENARIOS) * len(vertices) * len(clouds)
-    with Progress("measuring", [1.0] * count, "", quiet=False) as progress:
+    with ProgressBar("measuring", [1.0] * count, "", quiet=False) as progress:
         for done, (inputs, peers) in enumerate(_prepared(vertices, clouds), 1):
             found += results(inputs, peers, QUICK if options.quick else FULL)
             progress.first(done)

@@ -1,6 +1,8 @@
 #include <chrono>
 
 #include "pipeline.hpp"
+#include "proxcgal/pipeline/command.hpp"
+#include "proxcgal/pipeline/distance.hpp"
 
 namespace proxcgal::bench {
 namespace {

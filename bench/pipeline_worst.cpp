@@ -1,6 +1,7 @@
 #include <random>
 
 #include "pipeline.hpp"
+#include "proxcgal/pipeline/distance.hpp"
 
 namespace proxcgal::bench {
 namespace {

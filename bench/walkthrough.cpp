@@ -1,6 +1,6 @@
 // One cycle of walk-through programming: the guard on seven capsules, and hand guiding.
 #include "../cpp/tests/guards.hpp"
-#include "proxcgal/hand_guide.hpp"
+#include "proxcgal/guiding/hand_guide.hpp"
 #include "samples.hpp"
 
 namespace proxcgal {

@@ -5,7 +5,6 @@ find_package(nanobind CONFIG REQUIRED)
 file(GLOB_RECURSE proxcgal_binding_sources CONFIGURE_DEPENDS cpp/python/*.cpp)
 nanobind_add_module(_core NB_STATIC NB_SUPPRESS_WARNINGS NOMINSIZE ${proxcgal_binding_sources})
 target_link_libraries(_core PRIVATE proxcgal::core proxcgal_flags)
-target_include_directories(_core PRIVATE cpp/src)  # settings are checked in one form: require.hpp
 
 # The stub generator imports the module as it will be installed: inside a package. Of the package
 # only the exceptions are there, which the module looks up.

@@ -6,7 +6,7 @@
 
 #include "fuzz/bytes.hpp"
 #include "fuzz/tick_checks.hpp"
-#include "proxcgal/controller.hpp"
+#include "proxcgal/control/controller.hpp"
 #include "robots.hpp"
 
 /// Bytes to ticks of a controller: what `fuzz/tick.cpp` and the tests run.

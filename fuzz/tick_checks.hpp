@@ -5,8 +5,10 @@
 #include <sstream>
 #include <string>
 
-#include "internal_clock.hpp"
-#include "proxcgal/controller.hpp"
+#include "perception/monotonic_clock.hpp"
+#include "proxcgal/control/controller.hpp"
+#include "proxcgal/pipeline/command.hpp"
+#include "proxcgal/pipeline/distance.hpp"
 
 /// What every tick owes, whatever it is given: goal 1 of docs/reliability.md.
 namespace proxcgal::fuzz {
@@ -192,7 +194,7 @@ class TickChecks {
   const Robot& robot_;
   Posture posture_;
   JointVector last_, before_;
-  detail::InternalClock clock_;
+  detail::MonotonicClock clock_;
   double step_ = 0.0;
   double d_min_ = 0.0;
   TickCounts counts_;

@@ -9,7 +9,7 @@ import trimesh  # noqa: F401
 from bounds import promises
 from places import folder
 
-from proxcgal.models import load_robot
+from proxcgal.models.robots import load_robot
 
 _TRIANGLE = b"""OFF
 3 1 0

@@ -2,7 +2,7 @@
 
 #include "convert.hpp"
 #include "named_pair.hpp"
-#include "proxcgal/controller.hpp"
+#include "proxcgal/control/controller.hpp"
 #include "topics.hpp"
 
 namespace proxcgal::binding {

@@ -1,4 +1,4 @@
-#include "proxcgal/hand_guide.hpp"
+#include "proxcgal/guiding/hand_guide.hpp"
 #include "robot_arguments.hpp"
 #include "topics.hpp"
 

@@ -14,7 +14,6 @@
 
 #include "proxcgal/error.hpp"
 #include "proxcgal/types.hpp"
-#include "require.hpp"
 
 /// From what a user passes to what the core takes: shape, type and finiteness are told by name.
 namespace proxcgal::binding {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "named_pair.hpp"
-#include "proxcgal/controller.hpp"
+#include "proxcgal/control/controller.hpp"
 
 /// What a tick tells, as Python keeps it: links by name, nothing that the next tick writes over.
 namespace proxcgal::binding {

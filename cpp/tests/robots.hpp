@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "meshes.hpp"
-#include "proxcgal/controller.hpp"
+#include "proxcgal/control/controller.hpp"
 
 namespace proxcgal::test {
 

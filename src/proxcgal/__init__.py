@@ -70,21 +70,18 @@ from proxcgal.core.errors import (
     RecordingError,
     SimulationError,
 )
-from proxcgal.models import (
-    MountCheck,
-    MountChecks,
-    Robot,
-    attach,
-    attach_mesh,
-    check_mounts,
-    fit_capsules,
-    load_robot,
-    ring_skin,
-)
 
 if TYPE_CHECKING:
+    from proxcgal.models.assembly import attach, attach_mesh
+    from proxcgal.models.builtin import list_robots
+    from proxcgal.models.capsule_fit import fit_capsules
+    from proxcgal.models.mount_check import MountCheck, MountChecks, check_mounts
+    from proxcgal.models.robots import Robot, load_robot
+    from proxcgal.models.skins import ring_skin
+    from proxcgal.scenario.loading import load_scenario
     from proxcgal.server.goals import GoalRefusedError, JointGoal
     from proxcgal.server.joint_server import JointRobotServer
+    from proxcgal.trial.trial import run_trial
 
 __version__ = _version("proxcgal")
 
@@ -150,26 +147,44 @@ __all__ = [
     "closing_speed",
     "fit_capsules",
     "guard_contradictions",
+    "list_robots",
     "load_robot",
+    "load_scenario",
     "mesh_distance",
     "protective_distance",
     "remove_body",
     "ring_skin",
+    "run_trial",
     "self_distances",
     "signed_distance",
     "solve",
     "zone_directions",
 ]
 
-#: Made on first use: they need the simulator, which takes longer to import than all the rest.
+#: Imported on first use, by module: pydantic, mesh readers and the simulator take longer to import
+#: than all the rest.
 _LATER = {
-    "GoalRefusedError": "proxcgal.server.goals",
-    "JointGoal": "proxcgal.server.goals",
-    "JointRobotServer": "proxcgal.server.joint_server",
+    "models": (
+        "MountCheck",
+        "MountChecks",
+        "Robot",
+        "attach",
+        "attach_mesh",
+        "check_mounts",
+        "fit_capsules",
+        "list_robots",
+        "load_robot",
+        "ring_skin",
+    ),
+    "scenario.loading": ("load_scenario",),
+    "server.goals": ("GoalRefusedError", "JointGoal"),
+    "server.joint_server": ("JointRobotServer",),
+    "trial.trial": ("run_trial",),
 }
 
 
 def __getattr__(name: str) -> object:
-    if name in _LATER:
-        return getattr(_import_module(_LATER[name]), name)
+    for module, names in _LATER.items():
+        if name in names:
+            return getattr(_import_module(f"proxcgal.{module}"), name)
     raise AttributeError(f"module 'proxcgal' has no attribute '{name}'")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import proxcgal as px
-from proxcgal.models.mesh.files import box, ellipsoid
+from proxcgal.models.mesh.shapes import box, ellipsoid
 
 
 @pytest.fixture(scope="module")

@@ -8,9 +8,9 @@ import pytest
 
 import proxcgal as px
 from proxcgal.core import cache
-from proxcgal.models.formats import load
+from proxcgal.models.formats import description_reader
 from proxcgal.models.mesh import resolution
-from proxcgal.models.mesh.files import box
+from proxcgal.models.mesh.shapes import box
 from proxcgal.models.mesh.subdivision import subdivide
 
 OBJ = "v 0 0 0\nv {x} 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
@@ -40,13 +40,13 @@ def description(tmp_path: Path) -> Path:
 
 def counted(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     calls: list[str] = []
-    real = load.parse_xml
+    real = description_reader.parse_xml
 
     def parse(*arguments: object) -> object:
         calls.append("parse")
         return real(*arguments)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(load, "parse_xml", parse)
+    monkeypatch.setattr(description_reader, "parse_xml", parse)
     return calls
 
 

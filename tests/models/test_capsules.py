@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 import proxcgal as px
 from proxcgal.core.errors import ModelError
-from proxcgal.models import fit_capsules
 from proxcgal.models.builtin import ga_ol
-from proxcgal.models.capsules import capsule_mesh, fit_capsule
+from proxcgal.models.capsule_fit import fit_capsule, fit_capsules
 from proxcgal.models.formats.capsule_robot import read_capsule_robot
+from proxcgal.models.mesh.shapes import capsule_between
 
 Point = tuple[int, int, int]
 
@@ -141,7 +141,7 @@ def test_fitted_capsules_contain_the_meshes_of_the_ur10e() -> None:
 
 def test_a_capsules_own_mesh_is_fitted_by_that_capsule() -> None:
     start, end = np.array([0.1, 0.2, 0.3]), np.array([0.5, -0.2, 0.9])
-    found = fit_capsule(capsule_mesh(start, end, 0.1)[0])
+    found = fit_capsule(capsule_between(start, end, 0.1)[0])
     assert found.radius == pytest.approx(0.1, rel=0.02)
     ends = {tuple(np.round(p, 1)) for p in (found.start, found.end)}
     assert ends == {tuple(np.round(p, 1)) for p in (start, end)}
@@ -159,7 +159,7 @@ def test_a_capsules_mesh_is_closed_and_lies_on_it(length: float) -> None:
     import trimesh
 
     start, end = np.array([0.1, 0.0, 0.2]), np.array([0.1, length, 0.2])
-    vertices, triangles = capsule_mesh(start, end, 0.15)
+    vertices, triangles = capsule_between(start, end, 0.15)
     mesh = trimesh.Trimesh(vertices, triangles, process=False)
     assert mesh.is_watertight
     ideal = np.pi * 0.15**2 * (length + 4 / 3 * 0.15)

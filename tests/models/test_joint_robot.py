@@ -9,7 +9,7 @@ import pytest
 import proxcgal as px
 from proxcgal.models.limits import LIMITS
 from proxcgal.models.surfaces import Surfaces
-from proxcgal.scenario.joint import CONFIGURATIONS
+from proxcgal.scenario.joint_scenario import CONFIGURATIONS
 from proxcgal.scenario.setup import posture_problems
 
 FREE = np.array(CONFIGURATIONS["free"])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import proxcgal as px
-from proxcgal.models import list_robots
+from proxcgal.models.builtin import list_robots
 from proxcgal.models.limits import RAMP_TIME
 
 DEGREE = np.pi / 180

@@ -5,7 +5,7 @@ import pytest
 
 import proxcgal as px
 from proxcgal.models import macro_micro
-from proxcgal.scenario.joint import CONFIGURATIONS, JointScenario
+from proxcgal.scenario.joint_scenario import CONFIGURATIONS, JointScenario
 from proxcgal.scenario.loading import load_scenario, parse_scenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.study.joint.metrics import COLUMNS, joint_metrics

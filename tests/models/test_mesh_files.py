@@ -7,15 +7,8 @@ import numpy as np
 import pytest
 
 import proxcgal as px
-from proxcgal.models.mesh.files import (
-    MAX_FACES,
-    box,
-    capsule,
-    clean,
-    cylinder,
-    ellipsoid,
-    load_mesh,
-)
+from proxcgal.models.mesh.files import MAX_FACES, clean_mesh, load_mesh
+from proxcgal.models.mesh.shapes import box, capsule, cylinder, ellipsoid
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 
@@ -95,7 +88,7 @@ def test_every_mesh_format_gives_the_same_surface(tmp_path: Path) -> None:
     for suffix in ("stl", "obj", "ply", "off", "dae"):
         path = tmp_path / f"sphere.{suffix}"
         sphere.export(path)
-        vertices, triangles, dropped = clean(*load_mesh(path), suffix)
+        vertices, triangles, dropped = clean_mesh(*load_mesh(path), suffix)
         assert (len(vertices), len(triangles), dropped) == (162, 320, 0), suffix
         np.testing.assert_allclose(np.linalg.norm(vertices, axis=1), 0.3, atol=1e-6)
 

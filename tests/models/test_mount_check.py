@@ -9,10 +9,12 @@ from scipy.stats import chi2
 
 import proxcgal as px
 from proxcgal.models import mount_check
-from proxcgal.scenario.keys import Fault
-from proxcgal.scenario.loading import Scenario, load_scenario
+from proxcgal.scenario.fault_keys import Fault
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.scenario.scenario import Scenario
 from proxcgal.scenario.setup import Setup
-from proxcgal.sim.mount_faults import SCANS, RealMounts
+from proxcgal.sim.assembly import MOUNT_CHECK_SCANS
+from proxcgal.sim.mount_faults import RealMounts
 from proxcgal.sim.source import SimulatedSource
 from proxcgal.sim.world import World
 from proxcgal.trial.trial import run_trial
@@ -24,7 +26,7 @@ SIGNS = ("", "-")
 def looked(setup: Setup, faults: tuple[Fault, ...] = (), seed: int = 0) -> px.MountChecks:
     own = replace(setup, scenario=setup.scenario.model_copy(update={"faults": faults}))
     source = SimulatedSource(own, World(own.robot, own.scene), seed)
-    return px.check_mounts(own.robot, own.skin, own.q0, source.standing(SCANS))
+    return px.check_mounts(own.robot, own.skin, own.q0, source.standing(MOUNT_CHECK_SCANS))
 
 
 @pytest.fixture(scope="module", params=SCENES)
@@ -81,7 +83,7 @@ def test_a_sensor_that_sees_no_body_is_not_judged(setup: Setup) -> None:
 def test_something_before_the_body_makes_no_mount_wrong(setup: Setup) -> None:
     source = SimulatedSource(setup, World(setup.robot, setup.scene), 0)
     scans = []
-    for scan in source.standing(SCANS):
+    for scan in source.standing(MOUNT_CHECK_SCANS):
         ranges = np.array(scan.ranges)
         ranges[::3] = np.maximum(ranges[::3] - 0.07, 0.0)  # too near to be told is nothing told
         scans.append(px.Scan(scan.sensor, scan.counter, scan.stamp, ranges, scan.status))
@@ -110,7 +112,7 @@ def test_a_mount_fault_moves_only_its_sensor_and_only_for_its_time(setup: Setup)
     fault = Fault.model_validate(
         {"kind": "mount_offset", "sensor": 3, "from": 1.0, "to": 2.0, "value": 0.02}
     )
-    real = RealMounts(setup.skin.mounts, [fault], seed=4)
+    real = RealMounts(setup.robot, setup.skin.mounts, [fault], seed=4)
     right = np.array([mount.T_LS for mount in setup.skin.mounts])
     np.testing.assert_array_equal(real.at(0.5), right)
     np.testing.assert_array_equal(real.at(2.0), right)
@@ -121,9 +123,9 @@ def test_a_mount_fault_moves_only_its_sensor_and_only_for_its_time(setup: Setup)
 
 def test_a_turned_mount_stays_a_pose(setup: Setup) -> None:
     fault = Fault.model_validate({"kind": "mount_turn", "sensor": "all", "value": 0.3})
-    for T_LS, mount in zip(
-        RealMounts(setup.skin.mounts, [fault], 1).at(0.0), setup.skin.mounts, strict=True
-    ):
+    mounts = setup.skin.mounts
+    turned = RealMounts(setup.robot, mounts, [fault], 1).at(0.0)
+    for T_LS, mount in zip(turned, mounts, strict=True):
         by = np.asarray(mount.T_LS)[:3, :3].T @ T_LS[:3, :3]
         np.testing.assert_allclose(by @ by.T, np.eye(3), atol=1e-12)
         assert np.arccos((np.trace(by) - 1.0) / 2.0) == pytest.approx(0.3)

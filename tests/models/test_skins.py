@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import proxcgal as px
-from proxcgal.models.mesh.files import cylinder
+from proxcgal.models.mesh.shapes import cylinder
 
 STANDOFF = 0.01
 RINGS = [

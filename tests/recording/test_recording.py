@@ -12,11 +12,13 @@ from mcap.reader import make_reader
 from mcap.records import Message
 
 import proxcgal as px
-from proxcgal.core.transforms import rotation
-from proxcgal.core.versions import versions
+from proxcgal.core.provenance import versions
+from proxcgal.core.transforms import rotation_from_rpy
 from proxcgal.recording import codec, foxglove
-from proxcgal.recording.reader import Recorder, Recording, Settings, read_recording
+from proxcgal.recording.reader import Recording, Settings, read_recording
+from proxcgal.recording.writer import Recorder
 from proxcgal.scenario.loading import load_scenario
+from proxcgal.sim.clouds import Clouds
 from proxcgal.sim.tick import Found, TaskResult, Tick, TickInput, TickResult, TickTruth
 
 SCENARIO = load_scenario("front_plane", ["seed=3"])
@@ -63,11 +65,13 @@ def write(path: Path, ticks: int, settings: Settings = SETTINGS) -> list[Tick]:
     with Recorder(path) as recorder:
         recorder.start(settings)
         for tick in made:
+            row = round(100 * tick.inputs.time)
             if tick.inputs.scans:
-                cloud = np.arange(30.0).reshape(10, 3)
+                cloud = np.arange(30.0, dtype=np.float32).reshape(10, 3)
+                clouds = Clouds(cloud + row, cloud[row:] - row)
                 arrow = (tick.result.surface_W, tick.result.obstacle_W)
                 recorder.show_scene(tick.inputs.time, SCENARIO.scene(), tick.inputs.time)
-                recorder.show(tick.inputs.time, cloud, ["a"], np.eye(4)[None], arrow)
+                recorder.show(tick.inputs.time, clouds, ["a"], np.eye(4)[None], arrow)
             recorder.write(tick)
     assert recorder.failure is None
     return made
@@ -111,6 +115,27 @@ def test_everything_reads_back_bit_for_bit(tmp_path: Path) -> None:
         assert_same(found, tick)
 
 
+def test_each_tick_has_the_clouds_that_were_written_last(tmp_path: Path) -> None:
+    write(tmp_path / "a.mcap", 9)
+    recording = read_recording(tmp_path / "a.mcap")
+    assert recording.has_clouds
+    cloud = np.arange(30.0, dtype=np.float32).reshape(10, 3)
+    for row in range(9):
+        clouds, shown = recording.clouds(row), 7 * (row // 7)
+        assert clouds is not None
+        assert clouds.kept_W.tobytes() == (cloud + shown).tobytes()
+        assert clouds.removed_W.tobytes() == (cloud[shown:] - shown).tobytes()
+
+
+def test_a_recording_without_clouds_says_so(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "a.mcap") as recorder:
+        recorder.start(SETTINGS)
+        recorder.write(made_tick(0))
+    recording = read_recording(tmp_path / "a.mcap")
+    assert not recording.has_clouds
+    assert recording.clouds(0) is None
+
+
 def test_known_points_are_stored_once_and_exactly(tmp_path: Path) -> None:
     points = np.random.default_rng(0).normal(size=(500, 3))
     write(tmp_path / "a.mcap", 2, replace(SETTINGS, known_points_W=points))
@@ -136,11 +161,12 @@ def test_mcaps_own_reader_reads_every_message_as_json(tmp_path: Path) -> None:
             assert set(content) <= {*json.loads(schema.data).get("properties", content)}
             topics.setdefault(channel.topic, []).append((schema.name, content, message))
     assert {topic: len(messages) for topic, messages in topics.items()} == {
-        "/tick": 15, "/cloud": 3, "/links": 3, "/scene": 6,
+        "/tick": 15, "/cloud": 3, "/removed": 3, "/links": 3, "/scene": 6,
     }  # fmt: skip
     assert {topic: messages[0][0] for topic, messages in topics.items()} == {
         "/tick": "proxcgal.Tick",
         "/cloud": "foxglove.PointCloud",
+        "/removed": "foxglove.PointCloud",
         "/links": "foxglove.FrameTransforms",
         "/scene": "foxglove.SceneUpdate",
     }
@@ -150,7 +176,7 @@ def test_mcaps_own_reader_reads_every_message_as_json(tmp_path: Path) -> None:
 
 def test_arrow_points_from_the_robot_to_the_obstacle() -> None:
     tail, tip = np.array([0.1, 0.2, 0.3]), np.array([0.4, -0.2, 0.3])
-    content = json.loads(foxglove.pair_arrow(1.5, tail.tolist(), tip.tolist()))
+    content = json.loads(foxglove.arrow_update(1.5, tail.tolist(), tip.tolist()))
     (arrow,) = content["entities"][0]["arrows"]
     x, y, z, w = (arrow["pose"]["orientation"][name] for name in "xyzw")
     along = np.array([1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)])
@@ -161,7 +187,7 @@ def test_arrow_points_from_the_robot_to_the_obstacle() -> None:
 @pytest.mark.parametrize("rpy", [(0, 0, 0), (3.1, 0, 0), (0, 3.1, 0), (0, 0, 3.1), (1, -1, 2)])
 def test_link_frames_keep_their_orientation(rpy: tuple[float, float, float]) -> None:
     T = np.eye(4)
-    T[:3, :3] = rotation(rpy)
+    T[:3, :3] = rotation_from_rpy(rpy)
     content = json.loads(foxglove.frame_transforms(0.0, ["a"], T[None]))
     x, y, z, w = (content["transforms"][0]["rotation"][name] for name in "xyzw")
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from proxcgal import _core
 from proxcgal.core import toml
 from proxcgal.core.errors import ConfigError
-from proxcgal.scenario.joint import JointScenario
-from proxcgal.scenario.loading import Scenario, kinds, list_scenarios, load_scenario, parse_scenario
+from proxcgal.scenario.joint_scenario import JointScenario
+from proxcgal.scenario.loading import KINDS, list_scenarios, load_scenario, parse_scenario
+from proxcgal.scenario.scenario import Scenario
 from proxcgal.scenario.setup import Setup
 
 DOCS = Path(__file__).parents[2] / "docs" / "scenarios.md"
@@ -283,7 +284,7 @@ def test_places_may_have_any_name_and_resolved_text_keeps_it() -> None:
 
 def test_every_key_is_documented_with_its_default() -> None:
     text = DOCS.read_text()
-    for kind in (Scenario, kinds()["hri"]):
+    for kind in (Scenario, KINDS["hri"]):
         assert [row for row in rows_of(kind) if row not in text] == []
     joint = (DOCS.parent / "joint_robot.md").read_text()
     own = [row for row in rows_of(JointScenario) if "`configurations`" not in row]

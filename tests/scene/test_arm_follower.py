@@ -4,10 +4,10 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from proxcgal.core.transforms import pose, rotation
+from proxcgal.core.transforms import pose, rotation_from_rpy
 from proxcgal.scene.arm_follower import arm_followers
 from proxcgal.scene.dragging import DraggedSolids, LiveScene
-from proxcgal.scene.solids import Capsule, Solid, Sphere
+from proxcgal.scene.solids import CapsuleSolid, Solid, Sphere
 
 LENGTHS = (0.30, 0.26, 0.10)
 place = st.tuples(*[st.floats(-2.0, 2.0)] * 3)
@@ -17,7 +17,7 @@ class Standing:
     """Somebody who stands still, one arm hanging, z upwards."""
 
     names = ("head", "left_upper_arm", "left_forearm", "left_hand")
-    solids: tuple[Solid, ...] = (Sphere(0.1), *(Capsule(0.04, length) for length in LENGTHS))
+    solids: tuple[Solid, ...] = (Sphere(0.1), *(CapsuleSolid(0.04, length) for length in LENGTHS))
     still = True
 
     def poses(self, time: float) -> np.ndarray:
@@ -49,7 +49,7 @@ def test_a_dragged_hand_keeps_its_arm_together(
     for T in (upper, fore, hand):
         assert np.allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3))
         assert np.isclose(np.linalg.det(T[:3, :3]), 1.0)
-    assert np.allclose(hand[:3, :3], rotation(rpy))
+    assert np.allclose(hand[:3, :3], rotation_from_rpy(rpy))
 
 
 def test_within_reach_the_hand_goes_where_it_is_wanted() -> None:

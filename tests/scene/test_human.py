@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
 import proxcgal as px
-from proxcgal.scenario.loading import HriScenario, load_scenario
-from proxcgal.scene.human.body import NAMES, PARTS, POINTS, poses, radii, segments, upright
+from proxcgal.core.transforms import least_rotations_of_z
+from proxcgal.scenario.hri_scenario import HriScenario
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.scene.human.body import NAMES, PARTS, POINTS, poses, radii, segments
 from proxcgal.scene.human.motion import HZ, Motion, move
 from proxcgal.scene.human.person import Person, person_of
 from proxcgal.scene.human.recorded import HEADER, read_motion, write_motion
@@ -174,7 +176,7 @@ def test_a_capsules_ends_move_as_its_twist_says(time: float) -> None:
 @given(along=st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: np.linalg.norm(v) > 1e-3))
 @example(along=(0.0, 2.0**-24, -1.0))  # all but straight down
 def test_upright_brings_z_along_a_direction(along: tuple[float, float, float]) -> None:
-    R = upright(np.array(along))
+    R = least_rotations_of_z(np.array(along))
     np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-6)
     assert np.linalg.det(R) == pytest.approx(1.0, abs=1e-6)
     np.testing.assert_allclose(R[:, 2], np.array(along) / np.linalg.norm(along), atol=1e-12)

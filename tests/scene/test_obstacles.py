@@ -15,18 +15,20 @@ from proxcgal import _core
 from proxcgal.core.transforms import inverse, placed, pose
 from proxcgal.evaluation.ground_truth import GroundTruth
 from proxcgal.evaluation.sparse_ground_truth import half_box
-from proxcgal.recording.reader import Recorder, read_recording
-from proxcgal.scenario.keys import Obstacle
+from proxcgal.recording.reader import read_recording
+from proxcgal.recording.replay import first_difference
+from proxcgal.recording.writer import Recorder
 from proxcgal.scenario.loading import load_scenario
+from proxcgal.scene.obstacle_keys import Obstacle
 from proxcgal.scene.obstacles import KnownCloud, ObstacleScene
-from proxcgal.scene.solids import Box, Capsule, Cylinder, Solid, Sphere
+from proxcgal.scene.solids import Box, CapsuleSolid, Cylinder, Solid, Sphere
 from proxcgal.sim.world import World
-from proxcgal.trial.trial import first_difference, run_trial
+from proxcgal.trial.trial import run_trial
 
 Array = NDArray[np.float64]
 
 SOLIDS: tuple[Solid, ...] = (
-    Box((0.2, 0.5, 0.31)), Cylinder(0.1, 0.7), Capsule(0.08, 0.4), Sphere(0.15)
+    Box((0.2, 0.5, 0.31)), Cylinder(0.1, 0.7), CapsuleSolid(0.08, 0.4), Sphere(0.15)
 )  # fmt: skip
 Q = np.array([0.3, -1.7, 1.9, -1.7, -1.57, 0.2])
 solids = pytest.mark.parametrize("solid", SOLIDS, ids=lambda solid: type(solid).__name__)
@@ -42,10 +44,10 @@ def obstacle(solid: Solid, **keys: object) -> Obstacle:
     """One of that shape in front of the arm."""
     sizes = {
         Box: lambda s: s.size, Cylinder: lambda s: (s.radius, s.height),
-        Capsule: lambda s: (s.radius, s.length), Sphere: lambda s: (s.radius,),
+        CapsuleSolid: lambda s: (s.radius, s.length), Sphere: lambda s: (s.radius,),
     }  # fmt: skip
     inputs = {"position": (0.9, 0.3, 0.5), "rpy": (0.4, -0.3, 0.2), **keys}
-    shape = type(solid).__name__.lower()
+    shape = type(solid).__name__.lower().removesuffix("solid")
     return Obstacle(shape=shape, size=sizes[type(solid)](solid), **inputs)
 
 
@@ -107,7 +109,7 @@ def test_true_distance_to_each_shape_is_that_of_coal(ur10e: px.Robot, solid: Sol
     body = obstacle(solid)
     shapes = {
         Box: lambda s: coal.Box(*s.size), Cylinder: lambda s: coal.Cylinder(s.radius, s.height),
-        Capsule: lambda s: coal.Capsule(s.radius, s.length),
+        CapsuleSolid: lambda s: coal.Capsule(s.radius, s.length),
         Sphere: lambda s: coal.Sphere(s.radius),
     }  # fmt: skip
     shape = shapes[type(solid)](solid)
@@ -134,7 +136,7 @@ def test_true_distance_to_each_shape_is_that_of_coal(ur10e: px.Robot, solid: Sol
 
 def test_true_distance_skips_nothing_where_the_scene_moves(ur10e: px.Robot) -> None:
     path = ((0.0, 0.9, 0.3, 0.5), (1.0, 0.7, -0.4, 0.9), (1.5, 0.7, -0.4, 0.9))
-    scene = ObstacleScene([obstacle(Capsule(0.08, 0.4), path=path)])
+    scene = ObstacleScene([obstacle(CapsuleSolid(0.08, 0.4), path=path)])
     truth = GroundTruth(ur10e, scene)
     for k in range(150):
         q = Q + 0.1 * np.sin(0.05 * k)

@@ -50,6 +50,18 @@ def test_a_goal_is_reached_and_its_feedback_says_how_it_goes() -> None:
         assert arm.feedback() is None
 
 
+def test_the_arm_gives_its_state_and_takes_commands_as_every_source_does() -> None:
+    with server() as joint_robot:
+        arm = joint_robot._arm
+        inputs = arm.read()
+        assert inputs.known
+        np.testing.assert_array_equal(inputs.q, arm.q)
+        np.testing.assert_array_equal(inputs.goal, arm.tool)  # it holds still
+        arm.command(np.full(12, 0.1))
+        arm.move()
+        np.testing.assert_allclose(arm.q, inputs.q + 0.1 * arm.period)
+
+
 def test_a_server_that_was_closed_takes_nothing_on_and_does_not_start_again() -> None:
     with server("joint_free") as arm, pytest.raises(px.GoalRefusedError, match="a JointGoal"):
         arm.send_goal(None)  # type: ignore[arg-type]

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import proxcgal as px
-from proxcgal.scenario.keys import Fault
-from proxcgal.scenario.loading import Scenario, load_scenario
+from proxcgal.scenario.fault_keys import Fault
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.scenario.scenario import Scenario
 from proxcgal.sim.static_scan import StaticScan, scan_static
 from proxcgal.study.timing.inputs import SCENARIOS
 

@@ -12,9 +12,11 @@ from proxcgal.core.transforms import placed
 from proxcgal.evaluation.ground_truth import GroundTruth
 from proxcgal.evaluation.sparse_ground_truth import sparse_ground_truth
 from proxcgal.models.surfaces import ALWAYS_NEAR, Surfaces
-from proxcgal.scenario.keys import Obstacle, Sensor, Simulation
 from proxcgal.scenario.loading import load_scenario
 from proxcgal.scenario.setup import Setup
+from proxcgal.scenario.simulation_keys import SimulationKeys
+from proxcgal.scenario.skin_keys import SensorKeys
+from proxcgal.scene.obstacle_keys import Obstacle
 from proxcgal.scene.obstacles import ObstacleScene
 from proxcgal.sim.range_sensor import NO_TARGET, VALID, RangeModel
 from proxcgal.sim.source import SimulatedSource
@@ -150,11 +152,11 @@ def test_a_warning_of_mujoco_fails_the_run(world: World) -> None:
         world.place(Q)
 
 
-SENSOR = Sensor()
+SENSOR = SensorKeys()
 
 
 def model(**changes: float) -> RangeModel:
-    return RangeModel(Simulation(**changes), SENSOR, sensors=200, seed=5)
+    return RangeModel(SimulationKeys(**changes), SENSOR, sensors=200, seed=5)
 
 
 def lengths_to_wall(ranges: RangeModel, distance: float) -> Array:
@@ -263,7 +265,7 @@ def test_scans_are_taken_where_the_arm_was_at_their_stamp(ur10e: px.Robot) -> No
         still.place(q)
         mount = setup.skin.mounts[scan.sensor]
         pose = ur10e.link_poses(q)[list(ur10e.link_names).index(mount.link)] @ mount.T_LS
-        directions = RangeModel(Simulation(), SENSOR, 1, 0).rays_S
+        directions = RangeModel(SimulationKeys(), SENSOR, 1, 0).rays_S
         hits = still.cast(pose[None, :3, 3], (directions @ pose[:3, :3].T)[None], 0.005)
         seen = np.asarray(scan.status) == VALID
         expected = hits.length[0] * directions[:, 2]

@@ -395,7 +395,7 @@ def test_another_campaigns_folder_is_refused(call: Call, whole: Path) -> None:
 def test_a_folder_of_another_build_is_refused(
     call: Call, whole: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("proxcgal.core.versions.build", lambda: "another")
+    monkeypatch.setattr("proxcgal.core.provenance.build", lambda: "another")
     answer = call(*SMALL, "--quiet", "--out", whole)
     assert answer.code == 2
     assert "holds another campaign: made_with is " in answer.err

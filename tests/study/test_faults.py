@@ -11,9 +11,10 @@ import proxcgal as px
 from proxcgal import _core
 from proxcgal.core.errors import ConfigError
 from proxcgal.core.modes import DEGRADED, HOLD, RUN, STOP
-from proxcgal.recording.reader import Recorder, read_recording
+from proxcgal.recording.reader import read_recording
 from proxcgal.recording.render import recorded_moments
-from proxcgal.scenario.keys import INPUT_FAULTS, Fault
+from proxcgal.recording.writer import Recorder
+from proxcgal.scenario.fault_keys import INPUT_FAULTS, Fault
 from proxcgal.scenario.loading import load_scenario
 from proxcgal.sim.faults import FaultInjector
 from proxcgal.sim.tick import TickInput

@@ -11,7 +11,8 @@ import pytest
 
 from proxcgal.core.errors import ConfigError
 from proxcgal.evaluation.trial_log import sampled_ticks
-from proxcgal.scenario.loading import HriScenario, load_scenario
+from proxcgal.scenario.hri_scenario import HriScenario
+from proxcgal.scenario.loading import load_scenario
 from proxcgal.scene.human.motion import move
 from proxcgal.scene.human.recorded import write_motion
 from proxcgal.scene.human.subject import draw_subject

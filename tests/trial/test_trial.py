@@ -6,7 +6,7 @@ import itertools
 import os
 import statistics
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -14,22 +14,24 @@ import numpy as np
 import pytest
 from mcap.writer import Writer
 from PIL import Image
+from proxcgal.study.runs.simulation import warn_of_stopped
+from proxcgal.study.trial_simulation import simulate_trial
 
 import proxcgal as px
-from proxcgal.evaluation.trial_log import final_ticks
-from proxcgal.recording.reader import Recorder, Recording, read_recording
-from proxcgal.recording.render import animate, recorded_moments
-from proxcgal.recording.replay import Replay, recorded_log
-from proxcgal.scenario.keys import INPUT_FAULTS, Fault
+from proxcgal.evaluation.trial_log import TrialLog, final_ticks
+from proxcgal.recording.reader import Recording, read_recording
+from proxcgal.recording.render import draw, recorded_moments, write_gif
+from proxcgal.recording.replay import Replay, first_difference, recompute, recorded_log
+from proxcgal.recording.writer import Recorder
+from proxcgal.scenario.fault_keys import INPUT_FAULTS, Fault
 from proxcgal.scenario.loading import load_scenario
-from proxcgal.scenario.setup import Setup
+from proxcgal.scenario.setup import Setup, make_robot
 from proxcgal.sim.faults import FaultInjector
 from proxcgal.sim.range_sensor import NO_TARGET, VALID
 from proxcgal.sim.tick import TickInput
+from proxcgal.sim.world import World
 from proxcgal.study.campaign_picture import _draw
-from proxcgal.study.runs.simulation import warn_of_stopped
-from proxcgal.study.trial_simulation import simulate_trial
-from proxcgal.trial.trial import TrialLog, first_difference, recompute, run_trial
+from proxcgal.trial.trial import run_trial
 
 SHORT = ["duration=1.0"]
 NAMES = [f"s{row}" for row in range(4)]
@@ -415,12 +417,40 @@ def test_snapshots_hold_both_clouds_of_their_tick(recording: Recording) -> None:
     assert first.tick.inputs.time == pytest.approx(1.0)
     assert last.tick.inputs.time == pytest.approx(2.99)
     for snapshot in (first, last):
-        assert len(snapshot.raw_W) > len(snapshot.cloud_W) > 0
-        assert len(snapshot.cloud_W) == snapshot.tick.result.cloud_points
+        assert len(snapshot.clouds.removed_W) > 0
+        assert len(snapshot.clouds.kept_W) == snapshot.tick.result.cloud_points
+
+
+def test_recorded_clouds_are_those_that_a_replay_gives(recording: Recording) -> None:
+    times = np.arange(0.0, 3.0, 0.07).tolist()
+    older = replace(recording, cloud_messages=())
+    recorded, repeated = (recorded_moments(each, times) for each in (recording, older))
+    for then, now in zip(recorded, repeated, strict=True):
+        assert then.tick.result.same(now.tick.result)
+        assert then.elapsed == now.elapsed
+        assert then.clouds.kept_W.tobytes() == now.clouds.kept_W.tobytes()
+        assert then.clouds.removed_W.tobytes() == now.clouds.removed_W.tobytes()
+
+
+def test_the_ticks_with_scans_bring_their_clouds_too(ur10e: px.Robot, tmp_path: Path) -> None:
+    with Recorder(tmp_path / "a.mcap", "scans") as recorder:
+        scenario = load_scenario("front_plane", ["duration=1.0"])
+        run_trial(scenario, "wb", robot=ur10e, recorder=recorder)
+    recording = read_recording(tmp_path / "a.mcap")
+    moments = recorded_moments(recording, [0.0, 0.5, 9.0])
+    assert [len(m.clouds.kept_W) for m in moments] == [m.tick.result.cloud_points for m in moments]
+    assert [moment.elapsed for moment in moments] == pytest.approx([0.0, 0.54, 0.94])
 
 
 def test_a_run_becomes_a_small_moving_picture(recording: Recording, tmp_path: Path) -> None:
-    path = animate(recording, tmp_path / "a.gif", fps=2.0, size=(240, 180))
+    path, scenario = tmp_path / "a.gif", recording.settings.scenario
+    world = World(make_robot(scenario), scenario.drawn())
+    moments = recorded_moments(recording, np.arange(0.0, 3.0, 0.5).tolist())
+    try:
+        frames = [Image.fromarray(draw(world, moment, (240, 180))) for moment in moments]
+    finally:
+        world.close()
+    write_gif(frames, path, 2.0)
     with Image.open(path) as image:
         assert image.n_frames == 6  # type: ignore[attr-defined]
         assert image.size == (240, 180)

@@ -22,7 +22,8 @@ from documented import rows_of
 from proxcgal.core.errors import ConfigError, RecordingError, SimulationError
 from proxcgal.models.builtin import ga_ol
 from proxcgal.scenario.loading import load_scenario, parse_scenario
-from proxcgal.scenario.walkthrough import GuidedScenario, Leg, WalkScenario
+from proxcgal.scenario.walkthrough_keys import LegKeys
+from proxcgal.scenario.walkthrough_scenario import GuidedScenario, WalkScenario
 from proxcgal.sim.physics import Physics
 from proxcgal.study.plotting import GREY
 from proxcgal.study.runs.walkthrough import walkthrough_lines
@@ -31,22 +32,26 @@ from proxcgal.study.walkthrough.ratings import read_ratings
 from proxcgal.study.walkthrough.stops_figure import figures
 from proxcgal.trial.trial import run_trial
 from proxcgal.trial.walkthrough import playback
-from proxcgal.trial.walkthrough.guided import off_path
+from proxcgal.trial.walkthrough.guided_source import off_path
 from proxcgal.trial.walkthrough.intended_path import IntendedPath
 from proxcgal.trial.walkthrough.log import WalkLog
 from proxcgal.trial.walkthrough.playback import check_start, play
-from proxcgal.trial.walkthrough.poses import PoseRecorder, read_poses
+from proxcgal.trial.walkthrough.pose_recording import PoseRecorder, read_poses
 from proxcgal.trial.walkthrough.run import WalkResult, run_walk
 from proxcgal.trial.walkthrough.setup import PERIOD, WalkSetup
-from proxcgal.trial.walkthrough.stops import STRETCHED, not_worst, worst_stops
-from proxcgal.trial.walkthrough.taught import (
+from proxcgal.trial.walkthrough.stopping_performance import (
+    STRETCHED,
+    worst_case_problem,
+    worst_case_stops,
+)
+from proxcgal.trial.walkthrough.taught_path import (
     TaughtPath,
-    clean,
+    clean_path,
     to_csv,
     to_trajectory,
     tool_positions,
 )
-from proxcgal.trial.walkthrough.teach import REACHED, teach
+from proxcgal.trial.walkthrough.teaching import REACHED, teach
 
 ROOT = Path(__file__).parents[2]
 DOCS, SCENARIOS = ROOT / "docs" / "walkthrough.md", ROOT / "docs" / "scenarios.md"
@@ -83,7 +88,7 @@ def taught(short: WalkSetup) -> WalkLog:
 
 @pytest.fixture(scope="module")
 def path(short: WalkSetup, taught: WalkLog) -> TaughtPath:
-    return clean(short.robot, taught.time, taught.q, step=0.004, tolerance=0.001)
+    return clean_path(short.robot, taught.time, taught.q, step=0.004, tolerance=0.001)
 
 
 @pytest.mark.parametrize("name", OWN)
@@ -163,7 +168,7 @@ def test_a_playback_that_trips_on_its_way_to_the_start_tells_what_tripped(
 def test_cleaning_moves_the_tool_by_no_more_than_its_tolerance(
     short: WalkSetup, taught: WalkLog, tolerance: float
 ) -> None:
-    found = clean(short.robot, taught.time, taught.q, step=0.004, tolerance=tolerance)
+    found = clean_path(short.robot, taught.time, taught.q, step=0.004, tolerance=tolerance)
     moved = tool_positions(short.robot, found.at(found.raw_time)[0]) - found.raw_tool_W
     assert np.linalg.norm(moved, axis=1).max() == pytest.approx(found.deviation_m)
     assert found.deviation_m <= tolerance
@@ -195,9 +200,9 @@ def test_exports_hold_the_path(short: WalkSetup, path: TaughtPath) -> None:
 _TEACH = """
 import os, signal, sys
 from proxcgal.scenario.loading import load_scenario
-from proxcgal.trial.walkthrough.poses import PoseRecorder
+from proxcgal.trial.walkthrough.pose_recording import PoseRecorder
 from proxcgal.trial.walkthrough.setup import WalkSetup
-from proxcgal.trial.walkthrough.teach import teach
+from proxcgal.trial.walkthrough.teaching import teach
 setup = WalkSetup.of(load_scenario("walkthrough_teach"))
 class Killed(PoseRecorder):
     def write(self, *pose):
@@ -229,7 +234,8 @@ def test_part_of_a_path_is_not_played_where_the_disk_was_full(
         if time < 2.0:
             write(recorder, time, *pose)
         elif recorder.failure is None:
-            recorder._fail(OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
+            with recorder.guarded():
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(PoseRecorder, "write", until_full)
     with (
@@ -247,8 +253,8 @@ def test_a_file_that_holds_no_teaching_is_refused(tmp_path: Path) -> None:
 
 def test_wished_legs_go_from_rest_to_rest_and_no_faster_than_said() -> None:
     legs = (
-        Leg(to=(0.0, 1.0, 0.0), speed=0.8, ramp=0.4),
-        Leg(to=(0.0, 1.0, 0.0), turn=(0.0, 0.5, 0.0), speed=0.8, turn_speed=0.3),
+        LegKeys(to=(0.0, 1.0, 0.0), speed=0.8, ramp=0.4),
+        LegKeys(to=(0.0, 1.0, 0.0), turn=(0.0, 0.5, 0.0), speed=0.8, turn_speed=0.3),
     )
     wish = IntendedPath.of(legs, PERIOD)
     assert np.linalg.norm(wish.velocity, axis=1).max() == pytest.approx(0.8)
@@ -283,14 +289,14 @@ def test_an_arm_without_torque_falls_until_its_brakes_close_and_then_holds() -> 
 
 
 def test_weaker_brakes_stop_later(short: WalkSetup) -> None:
-    times = [stop.stop_time_s for stop in worst_stops(short)]
+    times = [stop.stop_time_s for stop in worst_case_stops(short)]
     assert times == sorted(times, reverse=True)
     assert times[1] <= 0.35
 
 
 def test_stops_tell_the_brakes_that_they_were_made_with() -> None:
     setup = setup_of("walkthrough_overspeed", "arm.brake_scale=0.8")
-    brakes = [stop.brake_scale for stop in worst_stops(setup)]
+    brakes = [stop.brake_scale for stop in worst_case_stops(setup)]
     assert brakes == pytest.approx([0.56, 0.8, 1.04])
 
 
@@ -305,9 +311,9 @@ def test_an_arm_that_is_not_stretched_level_in_that_posture_is_not_looked_at_in_
     ):
         other.write_text(text.replace(*change, 1).replace('"ga_ol"', '"other"'))
         setup = setup_of("walkthrough_overspeed", f"robot={other}")
-        assert worst_stops(setup) == []
-        assert told in (not_worst(setup) or "")
-    assert not_worst(setup_of("walkthrough_overspeed")) is None
+        assert worst_case_stops(setup) == []
+        assert told in (worst_case_problem(setup) or "")
+    assert worst_case_problem(setup_of("walkthrough_overspeed")) is None
 
 
 def test_nobody_pulls_in_a_cycle_that_is_told_no_force() -> None:
@@ -349,7 +355,7 @@ def test_a_pair_that_is_always_violated_is_refused() -> None:
 
 
 def test_what_is_monitored_accepted_and_missing_is_told(short: WalkSetup) -> None:
-    told = "\n".join(short.told())
+    told = "\n".join(short.notes())
     assert "distance to the operator: link_1, link_2, link_3, link_4" in told
     assert "accepted joint_stop.joint_6" in told
     assert "ISO/TS 15066 would be 0.98 m" in told
@@ -470,7 +476,7 @@ def test_an_arm_of_ones_own_runs_or_is_refused_before_anything_is_written(
         "walkthrough_overspeed", f"robot={five}", "q0=[0.0, 0.26, 0.52, 0.0, -0.785]",
         "guard.q_reference=[0.0, -0.35, 1.22, 0.0, -0.87]", "guard.accept=['joint_stop.joint_4']",
     )  # fmt: skip
-    assert worst_stops(setup) == []
+    assert worst_case_stops(setup) == []
 
 
 def test_a_hand_too_weak_for_its_path_is_told(taught: WalkLog) -> None:

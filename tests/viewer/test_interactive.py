@@ -19,10 +19,11 @@ import proxcgal as px
 from proxcgal.core.modes import STOP
 from proxcgal.core.transforms import pose
 from proxcgal.models.mesh.display import display_meshes
-from proxcgal.scenario.keys import Fault
-from proxcgal.scenario.loading import Scenario, load_scenario
+from proxcgal.scenario.fault_keys import Fault
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.scenario.scenario import Scenario
 from proxcgal.scene.dragging import DraggedSolids, LiveScene
-from proxcgal.sim.moment import without
+from proxcgal.sim.clouds import without
 from proxcgal.trial.interactive import LiveTrial
 from proxcgal.trial.trial import run_trial
 from proxcgal.viewer.choice import Choice, robots

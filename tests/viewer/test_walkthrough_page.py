@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from proxcgal.scenario.loading import load_scenario
-from proxcgal.scenario.walkthrough import WalkScenario
+from proxcgal.scenario.walkthrough_scenario import WalkScenario
 from proxcgal.sim.moment import Moment
 from proxcgal.trial.interactive import LiveTrial
-from proxcgal.trial.walkthrough.grip import ACCELERATION, HAND, SPEED, Grip
 from proxcgal.trial.walkthrough.interactive import WalkTrial
+from proxcgal.trial.walkthrough.interactive_hand import ACCELERATION, HAND, SPEED, InteractiveHand
 from proxcgal.trial.walkthrough.setup import PERIOD
 
 
@@ -109,7 +109,7 @@ def test_what_is_still_violated_refuses_the_torque_and_says_so(trial: WalkTrial)
 
 
 def test_a_hand_that_leaps_moves_within_its_bounds(trial: WalkTrial) -> None:
-    grip = Grip(trial.setup.scenario.hand, PERIOD)
+    grip = InteractiveHand(trial.setup.scenario.hand, PERIOD)
     wanted = np.eye(4)
     wanted[:3, 3] = 0.9, -0.9, 0.4
     grip.move(np.eye(4), wanted)

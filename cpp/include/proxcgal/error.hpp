@@ -1,4 +1,5 @@
 #pragma once
+#include <sstream>
 #include <stdexcept>
 #include <string>
 
@@ -27,5 +28,15 @@ class GeometryError : public ProxError {
  public:
   using ProxError::ProxError;
 };
+
+/// A setting's bound, checked at set-up.
+/// @throws ConfigError  naming the field, its value and what it must be
+template <class Value>
+void require(bool good, const char* field, const Value& value, const std::string& bound) {
+  if (good) return;
+  std::ostringstream message;
+  message << field << " is " << value << ", must be " << bound;
+  throw ConfigError(message.str());
+}
 
 }  // namespace proxcgal

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "box.hpp"
+#include "geometry/velocity_box.hpp"
 
 namespace proxcgal {
 namespace {

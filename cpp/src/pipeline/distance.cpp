@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "frames.hpp"
+#include "geometry/frames.hpp"
 #include "geometry/point_chunk.hpp"
 
 namespace proxcgal {

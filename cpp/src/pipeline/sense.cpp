@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "require.hpp"
+#include "proxcgal/error.hpp"
 
 namespace proxcgal {
 namespace {

@@ -6,8 +6,8 @@
 #include <limits>
 #include <numbers>
 
-#include "box.hpp"
-#include "require.hpp"
+#include "geometry/velocity_box.hpp"
+#include "proxcgal/error.hpp"
 
 namespace proxcgal {
 namespace {

@@ -6,7 +6,6 @@
 #include <numbers>
 
 #include "proxcgal/error.hpp"
-#include "require.hpp"
 
 namespace proxcgal {
 namespace {

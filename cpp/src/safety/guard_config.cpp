@@ -4,8 +4,8 @@
 #include <sstream>
 #include <utility>
 
+#include "proxcgal/error.hpp"
 #include "proxcgal/safety/guard.hpp"
-#include "require.hpp"
 
 namespace proxcgal {
 namespace {

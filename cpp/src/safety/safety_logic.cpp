@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "require.hpp"
+#include "proxcgal/error.hpp"
 
 namespace proxcgal {
 namespace {

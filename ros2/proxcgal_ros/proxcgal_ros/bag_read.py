@@ -12,7 +12,8 @@ from rosbags.highlevel import AnyReader
 
 from proxcgal.core.errors import ConfigError
 from proxcgal.recording.writer import Recorder, Settings
-from proxcgal.scenario.loading import Scenario, change_scenario, load_scenario, parse_scenario
+from proxcgal.scenario.loading import change_scenario, load_scenario, parse_scenario
+from proxcgal.scenario.scenario import Scenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.sim.loop import run_ticks
 from proxcgal.sim.source import RecordedSource

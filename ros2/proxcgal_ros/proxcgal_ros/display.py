@@ -13,7 +13,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from proxcgal import _core
 from proxcgal.core.modes import NAMES
-from proxcgal.models import Robot
+from proxcgal.models.robots import Robot
 from proxcgal.sim.tick import TickResult
 from proxcgal_ros.convert import point
 

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxcgal.core.modes import STOP
-from proxcgal.evaluation.termination import Outcome, pose_errors
-from proxcgal.models import Robot
+from proxcgal.core.transforms import pose_errors
+from proxcgal.evaluation.termination import Outcome
+from proxcgal.models.robots import Robot
 from proxcgal.server.goal_ledger import GoalLedger, Pursued
 from proxcgal.server.goals import (
     BASE,

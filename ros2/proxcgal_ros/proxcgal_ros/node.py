@@ -19,12 +19,13 @@ from visualization_msgs.msg import MarkerArray
 
 from proxcgal.core.errors import ConfigError
 from proxcgal.core.modes import HOLD, NAMES, STOP
-from proxcgal.models import check_mounts
+from proxcgal.models.mount_check import check_mounts
 from proxcgal.recording.writer import Recorder, Settings
-from proxcgal.scenario.loading import CONTROLLERS, change_scenario, load_scenario
+from proxcgal.scenario.loading import change_scenario, load_scenario
+from proxcgal.scenario.scenario import CONTROLLERS
 from proxcgal.scenario.setup import Setup
+from proxcgal.sim.assembly import MOUNT_CHECK_SCANS
 from proxcgal.sim.loop import run_ticks
-from proxcgal.sim.mount_faults import SCANS
 from proxcgal.sim.tick import UNKNOWN, Tick, TickInput, TickResult
 from proxcgal_ros import parameters, topics
 from proxcgal_ros.action import MoveRobotAction
@@ -144,7 +145,7 @@ class ControllerNode(Node):
                 self._recorder.close()
 
     def _require_mounts(self) -> None:
-        q, scans = self.source.standing(SCANS)
+        q, scans = self.source.standing(MOUNT_CHECK_SCANS)
         if q is None:
             return
         checks = check_mounts(self.setup.robot, self.setup.skin, q, scans)

@@ -25,7 +25,7 @@ from std_msgs.msg import Float64MultiArray
 
 from proxcgal.evaluation.sparse_ground_truth import sparse_ground_truth
 from proxcgal.evaluation.trial_log import NOTHING, TOO_CLOSE, final_ticks
-from proxcgal.scenario.loading import Scenario
+from proxcgal.scenario.scenario import Scenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.sim.source import SimulatedSource
 from proxcgal.sim.world import Hits, World

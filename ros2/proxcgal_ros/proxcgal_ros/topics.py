@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from proxcgal.models import Robot
+from proxcgal.models.robots import Robot
 
 JOINT_STATES = "joint_states"
 SCANS = "scans"  # and below it one topic for each array

@@ -40,7 +40,8 @@ class DemoOptions:
 def demo_command(options: DemoOptions, command: str) -> int:
     """Runs the demo; the report's path is the last line printed."""
     from proxcgal.report.write_report import write_report
-    from proxcgal.scenario.loading import USUAL, load_scenario
+    from proxcgal.scenario.loading import load_scenario
+    from proxcgal.scenario.scenario import USUAL
     from proxcgal.study.runs.scenes import ScenePlan, run_scenes
 
     workers = checked_workers(options.workers)

@@ -36,7 +36,7 @@ def scenarios_command(options: ScenariosOptions, command: str) -> int:
 
 def robots_command(options: RobotsOptions, command: str) -> int:
     """Lists the robots."""
-    from proxcgal.models.robots import list_robots
+    from proxcgal.models.builtin import list_robots
 
     _columns(list_robots())
     return 0

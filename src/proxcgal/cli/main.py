@@ -141,7 +141,7 @@ def _print_problems(message: str) -> None:
 
 
 def _print_versions() -> int:
-    from proxcgal.core.versions import versions
+    from proxcgal.core.provenance import versions
 
     print(f"proxcgal {metadata.version('proxcgal')}")
     for name, version in versions().items():

@@ -103,7 +103,8 @@ def run_command(options: RunOptions, command: str) -> int:
 
 def _check_subject(options: RunOptions) -> None:
     """Raises: ConfigError: a subject for a scenario without a virtual operator."""
-    from proxcgal.scenario.loading import HriScenario, load_scenario
+    from proxcgal.scenario.hri_scenario import HriScenario
+    from proxcgal.scenario.loading import load_scenario
 
     if options.subject is None:
         return

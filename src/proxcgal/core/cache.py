@@ -1,20 +1,21 @@
 """Arrays kept on disk between runs, found by what they were made from."""
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
+import io
 import json
 import os
-import tempfile
 import threading
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from proxcgal.core.files import write_bytes
 
 Arrays = dict[str, NDArray[Any]]
 _META = "meta"
@@ -23,13 +24,12 @@ _META = "meta"
 _HEADERS = threading.Lock()
 
 
+@dataclass(frozen=True, slots=True, eq=False)
 class Stored:
     """One entry: named arrays and a JSON object."""
 
-    def __init__(self, arrays: Mapping[str, NDArray[Any]], meta: Mapping[str, Any]) -> None:
-        """Of arrays by name, and what JSON can hold."""
-        self.arrays = dict(arrays)
-        self.meta = dict(meta)
+    arrays: Arrays
+    meta: dict[str, Any]
 
 
 class Cache:
@@ -68,14 +68,9 @@ class Cache:
         meta = np.frombuffer(json.dumps(entry.meta).encode(), dtype=np.uint8)
         with contextlib.suppress(OSError):
             path.parent.mkdir(parents=True, exist_ok=True)
-            handle, name = tempfile.mkstemp(dir=path.parent, suffix=".part")
-            try:
-                with os.fdopen(handle, "wb") as file:
-                    np.savez(file, **{_META: meta}, **entry.arrays)  # type: ignore[arg-type]
-                Path(name).replace(path)
-            except BaseException:
-                Path(name).unlink(missing_ok=True)
-                raise
+            content = io.BytesIO()
+            np.savez(content, **{_META: meta}, **entry.arrays)  # type: ignore[arg-type]
+            write_bytes(path, content.getvalue())
 
     def _path(self, key: Sequence[Any]) -> Path | None:
         if self.folder is None:

@@ -1,15 +1,16 @@
 """How far the work is: a bar on a terminal, a line per finished piece elsewhere."""
 
-from __future__ import annotations
-
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from proxcgal.core.closing import Closing
 
+#: Called with the share that is done, 0 to 1.
+OnProgress = Callable[[float], None]
 
-class Progress(Closing):
+
+class ProgressBar(Closing):
     """Share of several pieces of work done, on stderr.
 
     A bar on a terminal; in a log (CI) a line per finished piece; nothing when quiet.
@@ -28,7 +29,7 @@ class Progress(Closing):
         self._quiet = quiet
         self._bar: Any = None
         if not quiet and sys.stderr.isatty():
-            from tqdm import tqdm
+            from tqdm import tqdm  # here, because most runs draw no bar
 
             shape = "{l_bar}{bar}| {n:.0f}/{total:.0f} {unit} [{elapsed}, {remaining} left]"
             self._bar = tqdm(

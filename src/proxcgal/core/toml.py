@@ -1,7 +1,5 @@
 """TOML in and out: dotted overrides, and a writer for what the standard library only reads."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
@@ -62,25 +60,21 @@ def override(table: Table, assignment: str) -> str:
         raise ConfigError(f"override {assignment!r}: must have one value, and no lines after it")
     place: Any = table
     for depth, step in enumerate(steps):
-        last = depth == len(steps) - 1
+        within: Any = step
         if isinstance(place, list):
             if not (step.isdecimal() and int(step) < len(place)):
                 raise ConfigError(
                     f"override {assignment!r}: {'.'.join(steps[:depth])} has the entries "
                     f"0 to {len(place) - 1}, not {step}"
                 )
-            steps[depth] = str(int(step))
-            if last:
-                place[int(step)] = value
-            else:
-                place = place[int(step)]
-        elif isinstance(place, dict):
-            if last:
-                place[step] = value
-            else:
-                place = place.setdefault(step, {})
-        else:
+            within = int(step)
+            steps[depth] = str(within)
+        elif not isinstance(place, dict):
             raise ConfigError(f"override {assignment!r}: {'.'.join(steps[:depth])} is no table")
+        if depth == len(steps) - 1:
+            place[within] = value
+        else:
+            place = place.setdefault(within, {}) if isinstance(place, dict) else place[within]
     return ".".join(steps)
 
 

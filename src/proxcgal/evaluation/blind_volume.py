@@ -1,10 +1,7 @@
 """The space round the arm that no sensor sees, and for how long none has."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,10 +10,8 @@ from proxcgal.core.errors import ConfigError
 from proxcgal.core.transforms import inverse, placed
 from proxcgal.core.typing import Array
 from proxcgal.evaluation.visibility import Visibility
-
-if TYPE_CHECKING:
-    from proxcgal.models import Robot
-    from proxcgal.scenario.setup import Setup
+from proxcgal.models.robots import Robot
+from proxcgal.scenario.setup import Setup
 
 REACH_M = 0.5  #: [m] from the arm's surface: what is farther is not counted
 _SPACING_M = 0.05  # [m] of the points that stand for the volume
@@ -67,7 +62,7 @@ def last_seen(
 ) -> Array:
     """(n,) [s] stamp of the last posture that had each point in view, -inf where none had.
 
-    Only the robot hides anything: what a scene hides is in nobody's way where it stands.
+    Only the robot itself hides points; occlusion by the scene is ignored.
 
     Args:
         setup: robot and sensors.

@@ -1,9 +1,8 @@
 """What the sensors had in view of what mattered: the truly closest points of a run."""
 
-from __future__ import annotations
-
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +11,7 @@ from proxcgal.core.transforms import inverse, placed
 from proxcgal.core.typing import Array
 from proxcgal.evaluation.ground_truth import GroundTruth
 from proxcgal.evaluation.visibility import Visibility
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from proxcgal.scenario.setup import Setup
+from proxcgal.scenario.setup import Setup
 
 EVERY_S = 0.2  #: [s] from one closest point to the next that is looked at
 
@@ -35,7 +30,7 @@ class Coverage:
         return {f"{name}_share": float(share) for name, share in asdict(self).items()}
 
 
-#: Where nobody asked.
+#: Where it was not evaluated.
 NO_COVERAGE = Coverage()
 
 

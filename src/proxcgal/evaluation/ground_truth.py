@@ -4,20 +4,16 @@ For the evaluation only; no controller ever sees them. What is skipped is skippe
 proves it: between two postures a distance shrinks by no more than the two surfaces moved.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from proxcgal import _core
 from proxcgal.core.transforms import inverse, placed
 from proxcgal.core.typing import Array
-from proxcgal.models.surfaces import Surfaces, moved
-
-if TYPE_CHECKING:
-    from proxcgal.models.robots import Robot
-    from proxcgal.scene.obstacles import Scene
+from proxcgal.models.robots import Robot
+from proxcgal.models.surfaces import Surfaces, most_moved
+from proxcgal.scene.obstacles import Scene
 
 #: Looked for beyond the least distance so far, so that a far pair is not asked at every tick [m].
 AHEAD_M = 0.05
@@ -33,7 +29,7 @@ class TrueDistances(NamedTuple):
     obstacle_W: Array | None = None  #: (3,) [m] its nearest point
 
 
-#: Where nobody wanted to know.
+#: Where it was not computed.
 NOT_ASKED = TrueDistances(np.nan, "", np.nan)
 
 
@@ -97,7 +93,7 @@ class _SceneDistance:
         T_OL = self._T_OW[solids] @ poses_W[links]
         sweep = self._surfaces.sweep(links, T_OL)
         if self._sweep is not None:
-            self._at_least -= moved(self._sweep, sweep)
+            self._at_least -= most_moved(self._sweep, sweep)
         self._sweep = sweep
         best = _Nearest()
         for row in np.argsort(self._at_least):

@@ -1,24 +1,15 @@
-"""What trials amount to: the numbers of `summary.json`, as the experiments ask for them."""
+"""The numbers of `summary.json`, and files that are whole or not there."""
 
-from __future__ import annotations
-
-import json
-import math
-import os
-import tempfile
 from collections.abc import Mapping, Sequence
-from numbers import Integral
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from proxcgal.core.errors import ConfigError
-
-if TYPE_CHECKING:
-    from proxcgal.trial.trial import TrialLog
+from proxcgal.core.files import NOTHING_M, finite
+from proxcgal.core.tables import aligned, in_metres
+from proxcgal.evaluation.trial_log import TrialLog
 
 Summary = dict[str, Any]
 
-NOTHING_M = 9.99  # [m] how a distance to nothing is written
 SELF_LIMIT_M = 0.02  # [m] a run whose own links come nearer than this has failed
 CONTROLLER_KEYS = (
     "true_min_m",
@@ -30,7 +21,7 @@ CONTROLLER_KEYS = (
 )
 
 
-#: What of the closest points could be known, see `sim.coverage`.
+#: What of the closest points could be known, see `evaluation.coverage`.
 COVERAGE_KEYS = ("in_view_share", "remembered_share", "forgotten_share", "never_seen_share")
 
 
@@ -45,9 +36,9 @@ def static_summary(logs: Sequence[TrialLog]) -> Summary:
         distance at the end [m] (mean of the last 2 s), least seen distance [m], goal error at the
         end [m], violations (ticks with a true distance under 0.05 m), least distance between own
         links [m]), `closest_points` (per controller: what shares of the truly closest points the
-        sensors had in view, see `sim.coverage`), `gain_mm` (true distance at the end, wb over sm;
-        None where one did not run), `self_min_m` of all trials and `failed`, true where that is
-        under 0.02 m. What does not apply is None, a distance to nothing 9.99.
+        sensors had in view, see `evaluation.coverage`), `gain_mm` (true distance at the end,
+        wb over sm; None where one did not run), `self_min_m` of all trials and `failed`, true where
+        that is under 0.02 m. What does not apply is None, a distance to nothing 9.99.
 
     Raises:
         ConfigError: no log, logs of different scenarios, robots or seeds, a controller twice.
@@ -117,7 +108,7 @@ def table(summaries: Sequence[Summary]) -> str:
     for summary in summaries:
         for name, numbers in summary["controllers"].items():
             gain = summary["gain_mm"] if name == "wb" else None
-            cells = [shown(numbers[key]) for key in CONTROLLER_KEYS[:4]]
+            cells = [in_metres(numbers[key]) for key in CONTROLLER_KEYS[:4]]
             if violated:
                 cells.append("-" if numbers["violations"] is None else str(numbers["violations"]))
             last = "" if gain is None else f"{gain:+.0f}"
@@ -130,105 +121,11 @@ def coverage_lines(scene: str, controllers: Mapping[str, Mapping[str, float | No
     lines = []
     for name, numbers in controllers.items():
         shares = [numbers.get(key) for key in COVERAGE_KEYS]
-        told = [100.0 * share for share in shares if share is not None]
-        if len(told) == len(shares):
+        percent = [100.0 * share for share in shares if share is not None]
+        if len(percent) == len(shares):
             lines.append(
-                f"{scene}, {name}: of the truly closest points {told[0]:.0f} % were in view, "
-                f"{told[1]:.0f} % within the memory's time before, {told[2]:.0f} % earlier, "
-                f"{told[3]:.0f} % never"
+                f"{scene}, {name}: of the truly closest points {percent[0]:.0f} % were in view, "
+                f"{percent[1]:.0f} % within the memory's time before, {percent[2]:.0f} % earlier, "
+                f"{percent[3]:.0f} % never"
             )
     return lines
-
-
-def aligned(rows: Sequence[Sequence[str]], *, left: int, heads: int) -> str:
-    """Rows as lines of columns: the first `left` flush left, a rule below the first `heads`."""
-    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-    lines = []
-    for row in rows:
-        cells = [
-            cell.ljust(width) if column < left else cell.rjust(width)
-            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ]
-        lines.append("  ".join(cells).rstrip())
-    lines.insert(heads, "-" * max(map(len, lines)))
-    return "\n".join(lines)
-
-
-def counted(number: int, noun: str) -> str:
-    """A count for a reader: "1 subject", "2 subjects"."""
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
-
-
-def shown(value: float | None) -> str:
-    """A length for a reader [m]: millimetre digits, a dash where there is none."""
-    if value is None:
-        return "-"
-    return "none" if value >= NOTHING_M else f"{value:.3f}"
-
-
-def write_json(path: Path, content: Mapping[str, Any]) -> None:
-    """Strict JSON (no NaN), whole or not at all: written beside and moved into place.
-
-    Raises: as `as_json`.
-    """
-    write_bytes(path, as_json(content))
-
-
-def as_json(content: Mapping[str, Any]) -> bytes:
-    """Strict JSON (no NaN), as a file's bytes.
-
-    Raises:
-        ValueError: a number that is not finite, which JSON cannot hold.
-    """
-    text = json.dumps(content, indent=2, allow_nan=False, default=_plain)
-    return (text + "\n").encode()
-
-
-def write_text(path: Path, text: str) -> None:
-    """A file that is whole or not there: readers never meet half of it."""
-    write_bytes(path, text.encode())
-
-
-def write_bytes(path: Path, content: bytes) -> None:
-    """A file that is whole or not there, and on the disk once this returns.
-
-    Raises:
-        OSError: it cannot be written; with its name, where the disk is full too.
-    """
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        Path(name).chmod(0o644)  # mkstemp makes it private
-        Path(name).replace(path)
-    except BaseException as error:
-        Path(name).unlink(missing_ok=True)
-        if isinstance(error, OSError):
-            error.filename = str(path)
-        raise
-    folder = os.open(path.parent, os.O_RDONLY)
-    try:
-        os.fsync(folder)  # the name too
-    finally:
-        os.close(folder)
-
-
-def finite(value: Any) -> float | int | None:
-    """A finite plain number: None for NaN, 9.99 for a distance to nothing."""
-    if value is None:
-        return None
-    if isinstance(value, Integral):
-        return int(value)
-    number = float(value)
-    if math.isnan(number):
-        return None
-    return NOTHING_M if math.isinf(number) else number
-
-
-def _plain(value: Any) -> Any:
-    """NumPy numbers and arrays as JSON has them."""
-    if hasattr(value, "tolist"):
-        return value.tolist()
-    raise TypeError(f"{type(value).__name__} has no form in JSON")

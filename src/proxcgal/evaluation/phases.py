@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from proxcgal.core.typing import Array
-from proxcgal.evaluation.trial_log import NOTHING, sampled_ticks
+from proxcgal.evaluation.trial_log import NOTHING, TrialLog, sampled_ticks
 
 if TYPE_CHECKING:
-    from proxcgal.scenario.loading import HriScenario
-    from proxcgal.trial.trial import TrialLog
+    from proxcgal.scenario.hri_scenario import HriScenario
 
 SAMPLES_HZ = 15.0  # the sensors' rate: means of the true distance and all courses are taken at it
 Means = dict[str, tuple[float | None, float | None]]  # true and seen [m], None without any

@@ -4,10 +4,7 @@ A distance between two postures changes by no more than the surfaces moved. What
 no new least and no violation is not asked: least values, counts and what is asked are exact.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +13,10 @@ from proxcgal import _core
 from proxcgal.core.transforms import inverse
 from proxcgal.core.typing import Array, Bools
 from proxcgal.evaluation.ground_truth import AHEAD_M, solid_distance
-from proxcgal.models.surfaces import Surfaces, moved
-
-if TYPE_CHECKING:
-    from proxcgal.models.robots import Robot
-    from proxcgal.scene.obstacles import Scene
-    from proxcgal.scene.solids import Solid
+from proxcgal.models.robots import Robot
+from proxcgal.models.surfaces import Surfaces, most_moved
+from proxcgal.scene.obstacles import Scene
+from proxcgal.scene.solids import Solid
 
 #: Round ticks that are asked in turn: beyond, their neighbours say more.
 NEAR_TICKS = 25
@@ -141,7 +136,7 @@ class _Pairs:
             found = solid_distance(self._trees[row], self._rounding[row], other, T_AB, bound)[0]
             distance = min(found, bound)
             sweep, known = self._sweeps[row], self._at_least[row, ticks]
-            nearer = distance - moved(sweep[tick : tick + 1], sweep[ticks])
+            nearer = distance - most_moved(sweep[tick : tick + 1], sweep[ticks])
             np.maximum(known, nearer, out=known)
             if distance < best:
                 best, nearest = distance, int(row)

@@ -1,6 +1,4 @@
-"""What stopped the arm: the task without which it would go on, its link and what it keeps off."""
-
-from __future__ import annotations
+"""Finds the task that blocks progress, its link, and the obstacle."""
 
 from dataclasses import replace
 from typing import Any
@@ -8,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from proxcgal.core.modes import HOLD
-from proxcgal.core.transforms import inverse
+from proxcgal.core.transforms import inverse, pose_errors, sine_axis
 from proxcgal.core.typing import Array
-from proxcgal.evaluation.termination import Ending, StallCause, pose_errors
+from proxcgal.evaluation.termination import Ending, StallCause
 from proxcgal.models.macro_micro import tool_jacobian
 from proxcgal.scenario.setup import Setup
 from proxcgal.sim.tick import TickResult
@@ -68,7 +66,7 @@ def concluded(
         setup: of the run.
         ending: without what held the arm.
         last: of the run's ticks.
-        q: (n_q,) where the arm really stands, whatever a fault told the controller.
+        q: (n_q,) where the arm really stands, whatever a fault reports.
         points_W: (n, 3) what the controller was given, or saw, last [m].
         time: of the scene, at that tick [s].
     """
@@ -102,8 +100,7 @@ def _towards(setup: Setup, q: Array, goal: Array, points_W: Array) -> tuple[floa
     finish = setup.scenario.ends()
     error = pose_errors(T_WT, goal)
     if finish is not None and error[0] <= finish.position:  # the turn is what is missing
-        turn = goal[:3, :3] @ T_WT[:3, :3].T
-        axis = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+        axis = 2.0 * sine_axis(goal[:3, :3] @ T_WT[:3, :3].T)
         return float(velocity[3:] @ axis / max(float(np.linalg.norm(axis)), 1e-9)), out
     return float(velocity[:3] @ ahead_W / max(error[0], 1e-9)), out
 

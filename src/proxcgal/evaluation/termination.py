@@ -1,14 +1,13 @@
 """When a run is over: the goal reached, or no progress towards it for too long."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
+from proxcgal.core.transforms import pose_errors
 from proxcgal.core.typing import Array
-from proxcgal.scenario.joint import Finish
+from proxcgal.scenario.goal_keys import FinishKeys
 
 Outcome = Literal["succeeded", "aborted", "cancelled"]
 
@@ -34,11 +33,11 @@ class StallCause:
         }
         if not self.task:
             return "no single task holds it"
-        told = words.get(self.task, f"held by {self.task}")
+        text = words.get(self.task, f"held by {self.task}")
         parts = [part for part in (self.link, self.obstacle) if part]
         if self.sensor >= 0:
             parts.append(f"sensor {self.sensor}, zone {self.zone}")
-        return told + (f" ({', '.join(parts)})" if parts else "")
+        return text + (f" ({', '.join(parts)})" if parts else "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,23 +52,19 @@ class Ending:
 class GoalWatch:
     """Is the goal reached, or has nothing come nearer to it for a while?"""
 
-    def __init__(self, finish: Finish, goal: Array) -> None:
+    def __init__(self, finish: FinishKeys, goal: Array) -> None:
         """Args: `goal` is T_WT (4, 4)."""
         self._finish = finish
         self._goal = goal
         self._least = [np.inf, np.inf]  # [m], [rad] that counted as progress last
         self._since = 0.0
 
-    def errors(self, T_WT: Array) -> tuple[float, float]:
-        """Distance [m] and angle [rad] from the tool to the goal."""
-        return pose_errors(T_WT, self._goal)
-
     def __call__(self, time: float, T_WT: Array) -> Ending | None:
         """How the run ends here, or None: it goes on.
 
         Progress is a least error so far, in position or in angle, that fell by a set amount.
         """
-        errors, finish = self.errors(T_WT), self._finish
+        errors, finish = pose_errors(T_WT, self._goal), self._finish
         if errors[0] <= finish.position and errors[1] <= finish.angle:
             return Ending("succeeded", "the goal is reached")
         for row, error in enumerate(errors):
@@ -78,10 +73,3 @@ class GoalWatch:
         if time - self._since > finish.patience:
             return Ending("aborted", f"no progress for {finish.patience:g} s")
         return None
-
-
-def pose_errors(T_WT: Array, goal: Array) -> tuple[float, float]:
-    """Distance [m] and angle [rad] between two poses; accurate near 0 too."""
-    chord = np.linalg.norm(goal[:3, :3] - T_WT[:3, :3]) / np.sqrt(8.0)
-    angle = 2.0 * np.arcsin(min(float(chord), 1.0))
-    return float(np.linalg.norm(goal[:3, 3] - T_WT[:3, 3])), float(angle)

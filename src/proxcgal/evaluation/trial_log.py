@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from proxcgal.core.typing import Array, Bools
 from proxcgal.evaluation.coverage import NO_COVERAGE, Coverage, Sighting
 from proxcgal.evaluation.termination import Ending
-from proxcgal.models import Robot
+from proxcgal.models.robots import Robot
 from proxcgal.sim.tick import TaskResult, Tick, TickResult
 
 NOTHING = 9.99  #: [m] stands for the distance to nothing
@@ -179,7 +179,7 @@ def _points(points: Sequence[Sequence[float] | None]) -> Array:
 
 
 def _tool(robot: Robot, q: Array) -> Array:
-    """(4, 4) T_WT; nan where a fault told the controller no posture."""
+    """(4, 4) T_WT; nan where a fault reports no posture."""
     return np.asarray(robot.tool_pose(q)) if np.isfinite(q).all() else np.full((4, 4), np.nan)
 
 

@@ -1,17 +1,12 @@
 """Which points of space the sensors have in view, whatever they measure there."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from proxcgal.core.typing import Array, Bools
+from proxcgal.scenario.setup import Setup
+from proxcgal.scene.obstacles import Scene
+from proxcgal.sim.mount_faults import RealMounts
 from proxcgal.sim.world import World
-
-if TYPE_CHECKING:
-    from proxcgal.scenario.setup import Setup
-    from proxcgal.scene.obstacles import Scene
 
 _BEFORE_M = 0.005  # a ray that ends so little before a point on a surface has reached it
 
@@ -25,12 +20,8 @@ class Visibility:
 
     def __init__(self, setup: Setup, scene: Scene | None) -> None:
         """Args: without a `scene` only the robot itself hides anything."""
-        self._robot = setup.robot
         self._world = World(setup.robot, scene)
-        links = list(setup.robot.link_names)
-        mounts = setup.skin.mounts
-        self._links = np.array([links.index(mount.link) for mount in mounts], np.intp)
-        self._T_LS = np.array([mount.T_LS for mount in mounts]).reshape(-1, 4, 4)
+        self._mounts = RealMounts(setup.robot, setup.skin.mounts)
         sensor = setup.scenario.skin.sensor
         self._tangent = np.tan(0.5 * sensor.field_of_view)
         self._near, self._far, self._reach = sensor.min_range, sensor.max_range, sensor.workspace
@@ -45,9 +36,8 @@ class Visibility:
             time: [s] at which the scene is where it is.
         """
         self._world.place(q, time)
-        T_WS = np.asarray(self._robot.link_poses(q))[self._links] @ self._T_LS
         seen = np.zeros(len(points_W), bool)
-        for T in T_WS:
+        for T in self._mounts.poses_W(q, time):
             apart = points_W - T[:3, 3]
             x, y, z = (apart @ T[:3, :3]).T
             distance = np.linalg.norm(apart, axis=1)

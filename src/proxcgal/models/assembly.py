@@ -1,7 +1,5 @@
 """One chain out of two, and bodies put on a link."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import replace
 
@@ -9,13 +7,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from proxcgal.core.errors import GeometryError, ModelError
+from proxcgal.core.transforms import placed
 from proxcgal.core.typing import Array, Ints
 from proxcgal.models.joining import joined, rigid
-from proxcgal.models.mesh.files import check_mesh, clean, load_mesh
+from proxcgal.models.mesh.files import check_mesh, clean_mesh, load_mesh
 from proxcgal.models.mesh.resolution import ControlMesh, check_resolution, control_mesh
 from proxcgal.models.robots import Robot
 
-Mesh = str | os.PathLike[str] | tuple[ArrayLike, ArrayLike]
+MeshSource = str | os.PathLike[str] | tuple[ArrayLike, ArrayLike]
 
 
 def attach(
@@ -52,7 +51,7 @@ def attach(
 def attach_mesh(
     robot: Robot,
     link: str,
-    mesh: Mesh,
+    mesh: MeshSource,
     pose: ArrayLike | None = None,
     *,
     vertices: int | None = 1000,
@@ -80,7 +79,7 @@ def attach_mesh(
     row = robot.description.link_row(link)
     T_LM = np.eye(4) if pose is None else rigid(pose, "pose")
     points, faces, dropped = _triangles_of(mesh)
-    points = points @ T_LM[:3, :3].T + T_LM[:3, 3]
+    points = placed(T_LM, points)
     few = None if vertices is None or len(points) <= vertices else vertices
     coarse = control_mesh(points, faces, few, max_deviation)
     old, kept = robot.description.links[row], robot.control[row]
@@ -100,9 +99,9 @@ def attach_mesh(
     return Robot(replace(robot.description, links=tuple(links)), control)
 
 
-def _triangles_of(mesh: Mesh) -> tuple[Array, Ints, int]:
+def _triangles_of(mesh: MeshSource) -> tuple[Array, Ints, int]:
     if isinstance(mesh, str | os.PathLike):
-        return clean(*load_mesh(mesh), str(mesh))
+        return clean_mesh(*load_mesh(mesh), str(mesh))
     try:
         vertices, triangles = (np.asarray(part) for part in mesh)
         if np.iscomplexobj(vertices):
@@ -113,7 +112,7 @@ def _triangles_of(mesh: Mesh) -> tuple[Array, Ints, int]:
     if not np.issubdtype(triangles.dtype, np.integer):
         raise GeometryError(f"mesh: triangles are {triangles.dtype}; integers are needed")
     check_mesh(points, triangles, "mesh")
-    return clean(points, triangles, "mesh")
+    return clean_mesh(points, triangles, "mesh")
 
 
 def _joined(v: Array, f: Ints, w: Array, g: Ints) -> tuple[Array, Ints]:

@@ -1,24 +1,19 @@
 """The robots that are known by name, and where their data comes from."""
 
-from __future__ import annotations
-
 import functools
 import importlib.util
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from proxcgal.core.errors import ModelError
 from proxcgal.models.description import Frame, RobotDescription
-from proxcgal.models.formats.load import read_description
+from proxcgal.models.formats.capsule_robot import CapsuleRobot, read_capsule_robot
+from proxcgal.models.formats.description_reader import read_description
 from proxcgal.models.joining import joined
 from proxcgal.models.limits import LIMITS, Limits, with_limits
-
-if TYPE_CHECKING:
-    from proxcgal.models.formats.capsule_robot import CapsuleRobot
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,8 +49,6 @@ def _kr150() -> RobotDescription:
 @functools.cache
 def ga_ol() -> CapsuleRobot:
     """The painting arm of [WT] as its capsules, masses and brakes; its lengths are ours."""
-    from proxcgal.models.formats.capsule_robot import read_capsule_robot  # loads pydantic
-
     return read_capsule_robot(_GA_OL)
 
 

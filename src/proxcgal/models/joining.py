@@ -1,7 +1,5 @@
 """Two robots' descriptions made one chain."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
@@ -39,7 +37,7 @@ def joined(
     """
     where = first.frame(link)
     own = renamed(first, prefixes[0])
-    there = moved(second, where.T_JF @ rigid(pose, "pose"), where.joint, len(first.joints))
+    there = hung_on(second, where.T_JF @ rigid(pose, "pose"), where.joint, len(first.joints))
     added = renamed(there, prefixes[1])
     links = (*own.links, *added.links)
     order = sorted(range(len(links)), key=lambda row: links[row].joint)
@@ -102,7 +100,9 @@ def renamed(description: RobotDescription, prefix: str) -> RobotDescription:
     )
 
 
-def moved(description: RobotDescription, T_JB: Array, joint: int, offset: int) -> RobotDescription:
+def hung_on(
+    description: RobotDescription, T_JB: Array, joint: int, offset: int
+) -> RobotDescription:
     """The robot hung on a joint of another: its rows shifted by `offset`, its base at T_JB."""
 
     def row(own: int) -> int:

@@ -1,7 +1,5 @@
 """Position, speed and acceleration limits: those of the built-in robots, and a user's own."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 

@@ -8,10 +8,9 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from proxcgal import _core
-from proxcgal.core.cache import Cache, Stored
 from proxcgal.core.errors import ConfigError
 from proxcgal.core.typing import Array
-from proxcgal.models.surfaces import Surfaces
+from proxcgal.models.surfaces import Surfaces, cached_pairs, random_postures
 
 if TYPE_CHECKING:
     from proxcgal.models.robots import Robot
@@ -58,19 +57,16 @@ def watched_pairs(robot: Robot, macro_joints: int, d_min: float) -> list[tuple[s
 
 def _never_near(robot: Robot, pairs: list[tuple[int, int]], d_min: float) -> set[tuple[int, int]]:
     """Those of the pairs that no random posture brings nearer than `d_min` [m]; kept in a cache."""
-    kept = Cache("never_near")
-    key = [_SAMPLES, d_min, pairs, robot.digest]
-    entry = kept.get(key)
-    if entry is None:
-        generator = np.random.default_rng(0)
-        reach = np.maximum(robot.q_min, -np.pi), np.minimum(robot.q_max, np.pi)
+
+    def never_near() -> list[tuple[int, int]]:
         left = list(pairs)
-        for q in generator.uniform(*reach, (_SAMPLES, robot.n_q)):
+        for q in random_postures(robot, _SAMPLES):
             near = np.asarray(_core.self_distances(robot, q, left, d_min)) < d_min
             left = [pair for pair, is_near in zip(left, near, strict=True) if not is_near]
-        entry = Stored({"pairs": np.array(left, np.int64).reshape(-1, 2)}, {})
-        kept.put(key, entry)
-    return {(int(a), int(b)) for a, b in entry.arrays["pairs"]}
+        return left
+
+    key = [_SAMPLES, d_min, pairs, robot.digest]
+    return {(int(a), int(b)) for a, b in cached_pairs("never_near", key, never_near)}
 
 
 def tool_jacobian(robot: Robot, q: Array) -> Array:
@@ -95,11 +91,9 @@ def largest_manipulability(robot: Robot, first: int, joints: int) -> float:
     """Of 4000 random postures of the whole robot, the same ones for the same robot."""
     known = _largest.setdefault(robot, {})
     if (first, joints) not in known:
-        generator = np.random.default_rng(0)
-        reach = np.maximum(robot.q_min, -np.pi), np.minimum(robot.q_max, np.pi)
-        postures = generator.uniform(*reach, (_POSTURES, robot.n_q))
         known[first, joints] = max(
-            manipulability(tool_jacobian(robot, q), first, joints) for q in postures
+            manipulability(tool_jacobian(robot, q), first, joints)
+            for q in random_postures(robot, _POSTURES)
         )
     return known[first, joints]
 

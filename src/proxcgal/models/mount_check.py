@@ -1,7 +1,5 @@
 """Do the sensors sit where they are said to? Asked of what they see of the arm itself."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 

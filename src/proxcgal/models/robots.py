@@ -1,7 +1,5 @@
 """Robots: from a name or a file to what the controller and the simulator use."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os
@@ -20,8 +18,8 @@ from proxcgal.core.errors import ConfigError, ModelError, ModelWarning
 from proxcgal.core.typing import Array, Ints
 from proxcgal.models.builtin import BUILTIN, list_robots
 from proxcgal.models.description import RobotDescription, listed
-from proxcgal.models.formats.load import read_description
-from proxcgal.models.formats.paths import SUFFIXES, is_robot_file
+from proxcgal.models.formats.description_reader import read_description
+from proxcgal.models.formats.paths import ROBOT_SUFFIXES, is_robot_file
 from proxcgal.models.limits import PerJoint, with_limits
 from proxcgal.models.mesh.resolution import (
     COUNT_TOLERANCE,
@@ -211,7 +209,9 @@ def _file(name_or_path: str | os.PathLike[str]) -> Path:
     path = Path(name_or_path)
     if is_robot_file(path) and path.is_file():
         return path
-    known = f"known by name are {listed(BUILTIN)}; a path to {', '.join(SUFFIXES)} works as well"
+    known = (
+        f"known by name are {listed(BUILTIN)}; a path to {', '.join(ROBOT_SUFFIXES)} works as well"
+    )
     if is_robot_file(path):
         raise ModelError(f"{path}: no such file; {known}")
     raise ModelError(f"robot '{name_or_path}' is not known; {known}")

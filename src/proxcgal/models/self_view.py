@@ -1,11 +1,10 @@
 """What sensors must see of the arm itself: their rays against its full-resolution links."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 
 from proxcgal import _core
+from proxcgal.core.transforms import rotation_from_vector
 from proxcgal.core.typing import Array
 from proxcgal.models.robots import Robot
 
@@ -66,7 +65,7 @@ class View:
 
     def __call__(self, moved: Array, zones: NDArray[np.intp]) -> Array:
         """Ranges (k, len(zones)) from mounts moved by (k, 6): shift [m], turn [rad], in S."""
-        turns = np.array([rotation_by(turn) for turn in moved[:, 3:]])
+        turns = np.array([rotation_from_vector(turn) for turn in moved[:, 3:]])
         R_WS = self._T_WS[:3, :3] @ turns
         origins = self._T_WS[:3, 3] + moved[:, :3] @ self._T_WS[:3, :3].T
         rays = self._rays_S[zones] @ np.swapaxes(R_WS, 1, 2)
@@ -74,14 +73,3 @@ class View:
         lengths = self._body.cast(starts.reshape(-1, 3), rays.reshape(-1, 3))
         ranges: Array = lengths.reshape(len(moved), len(zones)) * self._z_per_length[zones]
         return ranges
-
-
-def rotation_by(turn: Array) -> Array:
-    """(3, 3) of a rotation vector [rad]."""
-    angle = float(np.linalg.norm(turn))
-    if angle == 0.0:
-        return np.eye(3)
-    x, y, z = turn / angle
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    rotation: Array = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
-    return rotation

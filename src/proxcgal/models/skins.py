@@ -1,7 +1,5 @@
 """Sensor layouts: rings of sensors round a link, on its own surface."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Literal
 
@@ -10,7 +8,7 @@ import numpy as np
 from proxcgal import _core
 from proxcgal.core.errors import ConfigError, GeometryError, ModelError
 from proxcgal.core.typing import Array, Ints
-from proxcgal.models.mesh.files import FARTHEST
+from proxcgal.models.formats.safe_xml import FARTHEST
 from proxcgal.models.mesh.triangles import is_number
 from proxcgal.models.robots import Robot
 

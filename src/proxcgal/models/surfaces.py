@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable, Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from proxcgal import _core
 from proxcgal.core.cache import Cache, Stored
-from proxcgal.core.transforms import inverse
+from proxcgal.core.transforms import inverse, placed
 from proxcgal.core.typing import Array, Bools
 
 if TYPE_CHECKING:
@@ -42,29 +43,24 @@ class Surfaces:
             np.linalg.norm(vertices_L - center, axis=1).max()
             for vertices_L, center in zip(self._vertices, self._centers, strict=True)
         ])  # fmt: skip
-        generator = np.random.default_rng(0)
-        reach = np.maximum(robot.q_min, -np.pi), np.minimum(robot.q_max, np.pi)
-        postures = generator.uniform(*reach, (_POSTURES, robot.n_q))
-        poses = np.array([robot.link_poses(q) for q in postures])
+        poses = np.array([robot.link_poses(q) for q in random_postures(robot, _POSTURES)])
         moves = np.array([
             [robot.moves(joint, link) for joint in robot.joint_names] for link in robot.link_names
         ])  # fmt: skip
         #: Rows of the links that some joint moves.
         self.moving = [int(link) for link in np.flatnonzero(moves.any(axis=1))]
-        kept = Cache("self_pairs")
         digest = hashlib.sha256(poses.tobytes()).hexdigest()
         key = [ALWAYS_NEAR, digest, *(kinds["full"] for kinds in robot.mesh_hashes.values())]
-        entry = kept.get(key)
-        if entry is None:
-            pairs = [
+        #: (k, 2) pairs of links that are neither neighbours nor near in every posture.
+        self.self_pairs = cached_pairs(
+            "self_pairs",
+            key,
+            lambda: [
                 pair
                 for pair in combinations(range(len(self.trees)), 2)
                 if self._joints_between(moves, *pair) > 1 and not self._always_near(*pair, poses)
-            ]
-            entry = Stored({"pairs": np.array(pairs, np.int64).reshape(-1, 2)}, {})
-            kept.put(key, entry)
-        #: (k, 2) pairs of links that are neither neighbours nor near in every posture.
-        self.self_pairs: NDArray[np.int64] = entry.arrays["pairs"]
+            ],
+        )
 
     @classmethod
     def of(cls, robot: Robot) -> Surfaces:
@@ -75,10 +71,10 @@ class Surfaces:
 
     def motion(self, links: NDArray[np.intp], before: Array, after: Array) -> Array:
         """(k,) no point of these links (k,) moved farther between two poses (k, 4, 4) [m]."""
-        return moved(self.sweep(links, before), self.sweep(links, after))
+        return most_moved(self.sweep(links, before), self.sweep(links, after))
 
     def sweep(self, links: NDArray[np.intp], poses: Array) -> Array:
-        """(k, 12) of links (k,) at poses (k, 4, 4), for `moved` [m]: centre, turned radius."""
+        """(k, 12) of links (k,) at poses (k, 4, 4), for `most_moved` [m]: centre, turned radius."""
         radii, R = self.radii[links, None, None], poses[:, :3, :3]
         centers = np.einsum("nij,nj->ni", R, self._centers[links]) + poses[:, :3, 3]
         # A difference of rotations has two equal singular values and a zero.
@@ -95,7 +91,7 @@ class Surfaces:
         for pose in poses:
             T_AB = inverse(pose[a]) @ pose[b]
             if len(probes_B):
-                probes_A = probes_B @ T_AB[:3, :3].T + T_AB[:3, 3]
+                probes_A = placed(T_AB, probes_B)
                 if self.trees[a].closest(probes_A)[0].min() < ALWAYS_NEAR:
                     continue
             distance, _, near_B = self.trees[a].distance(self.trees[b], T_AB, ALWAYS_NEAR)
@@ -106,7 +102,25 @@ class Surfaces:
         return True
 
 
-def moved(before: Array, after: Array) -> Array:
+def random_postures(robot: Robot, count: int) -> Array:
+    """(count, n_q) within limits, of at most half a turn either way; the same every time."""
+    reach = np.maximum(robot.q_min, -np.pi), np.minimum(robot.q_max, np.pi)
+    return np.random.default_rng(0).uniform(*reach, (count, robot.n_q))
+
+
+def cached_pairs(
+    kind: str, key: Sequence[Any], make: Callable[[], Sequence[tuple[int, int]]]
+) -> NDArray[np.int64]:
+    """(k, 2) pairs of link rows, from the cache where they were made from the same key before."""
+    kept = Cache(kind)
+    entry = kept.get(key)
+    if entry is None:
+        entry = Stored({"pairs": np.array(make(), np.int64).reshape(-1, 2)}, {})
+        kept.put(key, entry)
+    return entry.arrays["pairs"]
+
+
+def most_moved(before: Array, after: Array) -> Array:
     """(k,) no point of a link moved farther between two rows of `Surfaces.sweep` (k, 12) [m]."""
     step = after - before
     centers, turns = step[:, :3], step[:, 3:]

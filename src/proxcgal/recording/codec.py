@@ -5,8 +5,6 @@ text would cost more than the tick. Python writes floats so that they read back 
 JSON has no number for is written as "nan", "inf", "-inf".
 """
 
-from __future__ import annotations
-
 import base64
 import json
 import math
@@ -119,7 +117,10 @@ def decode(data: bytes) -> tuple[Tick, int]:
             )
             for t in content["tasks"]
         ),
-        findings=tuple(_found(*found) for found in content["findings"]),
+        findings=tuple(
+            Found(reason, sensor, zone, link, float(age), count)
+            for reason, sensor, zone, link, age, count in content["findings"]
+        ),
         tick_us=float(content["tick_us"]),
     )
     truth = TickTruth(
@@ -167,12 +168,6 @@ def unpack_scans(data: bytes) -> tuple[_core.Scan, ...]:
             at += 8 * ZONES
         scans.append(_core.Scan(sensor, counter, stamp, ranges, status))
     return tuple(scans)
-
-
-def _found(
-    reason: str, sensor: int, zone: int, link: str | None, age: float | str, count: int
-) -> Found:
-    return Found(reason, sensor, zone, link, float(age), count)
 
 
 def _spelled(value: Any) -> Any:

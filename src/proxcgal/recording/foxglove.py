@@ -3,8 +3,6 @@
 Only the parts of the schemas that are used, under their published names and fields.
 """
 
-from __future__ import annotations
-
 import base64
 import json
 import math
@@ -13,8 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from proxcgal.core.transforms import axes_along, quaternion
 from proxcgal.core.typing import Array
 from proxcgal.scene.solids import Box, Cylinder, Solid, Sphere
+from proxcgal.sim.clouds import Points
 
 Schema = dict[str, Any]
 
@@ -68,16 +68,19 @@ _ENTITY = _object(
 _PRIMITIVES = ("arrows", "cubes", "spheres", "cylinders", *_OTHER_PRIMITIVES)
 _DELETION = _object("foxglove.SceneEntityDeletion", timestamp=_TIME, type=_WHOLE, id=_TEXT)
 
+_POINT_CLOUD = _object(
+    "foxglove.PointCloud", timestamp=_TIME, frame_id=_TEXT, pose=_POSE, point_stride=_WHOLE,
+    fields=_list(_FIELD), data=_BYTES,
+)  # fmt: skip
+
 #: Schema of each topic beside the ticks.
 TOPICS: dict[str, Schema] = {
-    "/cloud": _object(
-        "foxglove.PointCloud", timestamp=_TIME, frame_id=_TEXT, pose=_POSE, point_stride=_WHOLE,
-        fields=_list(_FIELD), data=_BYTES,
-    ),
+    "/cloud": _POINT_CLOUD,
     "/links": _object("foxglove.FrameTransforms", transforms=_list(_TRANSFORM)),
     "/scene": _object(
         "foxglove.SceneUpdate", deletions=_list(_DELETION), entities=_list(_ENTITY)
     ),
+    "/removed": _POINT_CLOUD,
 }  # fmt: skip
 
 
@@ -86,14 +89,19 @@ def nanoseconds(time: float) -> int:
     return min(max(round(time * _NANO), 0), 2**64 - 1) if math.isfinite(time) else 0
 
 
-def point_cloud(time: float, points_W: Array) -> bytes:
-    """foxglove.PointCloud of (n, 3) points."""
+def point_cloud(time: float, points_W: Points) -> bytes:
+    """foxglove.PointCloud of (n, 3) points [m]."""
     data = np.ascontiguousarray(points_W, "<f4").tobytes()
     fields = [{"name": n, "offset": 4 * i, "type": _FLOAT32} for i, n in enumerate("xyz")]
     return _json(
         timestamp=_time(time), frame_id=WORLD, pose=_pose(np.eye(4)), point_stride=12,
         fields=fields, data=base64.b64encode(data).decode(),
     )  # fmt: skip
+
+
+def points_of(message: bytes) -> Points:
+    """(n, 3) the points of a `point_cloud` [m]."""
+    return np.frombuffer(base64.b64decode(json.loads(message)["data"]), "<f4").reshape(-1, 3)
 
 
 def frame_transforms(time: float, names: Sequence[str], poses_W: Array) -> bytes:
@@ -109,7 +117,9 @@ def frame_transforms(time: float, names: Sequence[str], poses_W: Array) -> bytes
     return _json(transforms=transforms)
 
 
-def pair_arrow(time: float, tail_W: Sequence[float] | None, tip_W: Sequence[float] | None) -> bytes:
+def arrow_update(
+    time: float, tail_W: Sequence[float] | None, tip_W: Sequence[float] | None
+) -> bytes:
     """foxglove.SceneUpdate: the closest pair as an arrow; without one, the last arrow goes."""
     if tail_W is None or tip_W is None:
         gone = {"timestamp": _time(time), "type": 0, "id": "closest_pair"}
@@ -117,8 +127,9 @@ def pair_arrow(time: float, tail_W: Sequence[float] | None, tip_W: Sequence[floa
     tail, along = np.array(tail_W), np.array(tip_W) - np.array(tail_W)
     length = float(np.linalg.norm(along))
     head = min(0.03, 0.4 * length)
+    R = axes_along(along, (1.0, 0.0, 0.0)).T  # an arrow of Foxglove lies along x
     arrow = {
-        "pose": {"position": _vector(tail), "orientation": _turn_x_to(along)},
+        "pose": {"position": _vector(tail), "orientation": _quaternion(R)},
         "shaft_length": length - head, "shaft_diameter": 0.012, "head_length": head,
         "head_diameter": 0.03, "color": dict(zip("rgba", (0.85, 0.1, 0.1, 1.0), strict=True)),
     }  # fmt: skip
@@ -179,25 +190,4 @@ def _pose(T: Array) -> dict[str, dict[str, float]]:
 
 
 def _quaternion(R: Array) -> dict[str, float]:
-    """Shepperd's method: divides by the largest of the four components."""
-    trace = float(np.trace(R))
-    squares = [R[0, 0], R[1, 1], R[2, 2], trace]
-    k = int(np.argmax(squares))
-    if k == 3:
-        q = [R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1], 1.0 + trace]
-    else:
-        i, j = (k + 1) % 3, (k + 2) % 3
-        q = [0.0] * 4
-        q[k] = 1.0 - trace + 2.0 * R[k, k]
-        q[i], q[j], q[3] = R[i, k] + R[k, i], R[j, k] + R[k, j], R[j, i] - R[i, j]
-    unit = np.array(q) / np.linalg.norm(q)
-    return {name: float(value) for name, value in zip("xyzw", unit, strict=True)}
-
-
-def _turn_x_to(direction: Array) -> dict[str, float]:
-    """The rotation that brings the x axis, Foxglove's arrow, to a direction."""
-    length = np.linalg.norm(direction)
-    x = direction / length if length > 0.0 else np.array([1.0, 0.0, 0.0])
-    y = np.cross(np.eye(3)[np.argmin(np.abs(x))], x)
-    y /= np.linalg.norm(y)
-    return _quaternion(np.column_stack([x, y, np.cross(x, y)]))
+    return {name: float(value) for name, value in zip("xyzw", quaternion(R), strict=True)}

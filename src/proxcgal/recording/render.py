@@ -1,7 +1,5 @@
 """Pictures of a recorded run: the arm, what it senses, and the closest pair as an arrow."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,12 +9,10 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from proxcgal.core.errors import ConfigError
-from proxcgal.core.transforms import inverse, placed
 from proxcgal.core.typing import Array
 from proxcgal.recording.reader import Recording
 from proxcgal.recording.replay import Replay
-from proxcgal.scenario.setup import Setup
-from proxcgal.sim.moment import without
+from proxcgal.sim.clouds import Clouds
 from proxcgal.sim.tick import Tick
 from proxcgal.sim.world import Arrow, Camera, Color, Spheres, World
 
@@ -27,7 +23,6 @@ _RAW: Color = (0.25, 0.45, 0.95, 0.55)
 _PAIR: Color = (0.05, 0.60, 0.20, 1.0)
 _AXES: tuple[Color, ...] = ((0.9, 0.1, 0.1, 1.0), (0.1, 0.7, 0.1, 1.0), (0.1, 0.2, 0.9, 1.0))
 _GIF_COLORS = 128
-_ASIDE, _DOWN = -1.05, -0.38  # [rad] of the view against the obstacle's direction
 
 
 @dataclass(frozen=True)
@@ -35,8 +30,7 @@ class RecordedMoment:
     """What one tick looked like from inside the controller."""
 
     tick: Tick
-    cloud_W: Array  #: (n, 3) filtered [m]
-    raw_W: Array  #: (n, 3) before body removal [m]
+    clouds: Clouds
     elapsed: float  #: [s] of the run
     q: Array  #: (n_q,) where the arm was
 
@@ -55,31 +49,37 @@ def recorded_moments(
         raise ConfigError(f"recording {recording.path}: has no ticks to draw")
     rows = np.searchsorted([tick.inputs.time for tick in recording.ticks], times)
     wanted = np.minimum(rows, len(recording.ticks) - 1).tolist()
-    replay = Replay(recording, controller)
+    elapsed, postures = _elapsed(recording), list(recording.postures())
     taken = {}
-    for row, (tick, q) in enumerate(zip(replay, recording.postures(), strict=True)):
-        if row in wanted:
-            elapsed = row * replay.ctrl.config.period
-            taken[row] = RecordedMoment(
-                tick, replay.ctrl.cloud_W(), replay.ctrl.raw_cloud_W(), elapsed, q
-            )
-        if row >= max(wanted, default=-1):
-            break
+    for row, tick, clouds in _with_clouds(recording, controller, wanted):
+        taken[row] = RecordedMoment(tick, clouds, float(elapsed[row]), postures[row])
     return [taken[row] for row in wanted]
 
 
-def viewpoint(setup: Setup) -> Camera:
-    """From beside the arm, towards the face that the nearest obstacle turns to it."""
-    base_W = np.array([0.0, 0.0, 0.6])
-    tool_W = np.array(setup.robot.tool_pose(setup.q0))[:3, 3]
-    faces = [
-        placed(T_WO, solid.nearest(placed(inverse(T_WO), base_W)))
-        for solid, T_WO in zip(setup.scene.solids, setup.scene.poses(0.0), strict=True)
-    ]
-    face_W = min(faces, key=lambda point: float(np.linalg.norm(point - base_W)), default=tool_W)
-    across = np.arctan2(face_W[1], face_W[0])
-    middle = (base_W + tool_W + face_W) / 3.0
-    return Camera(tuple(middle.tolist()), 2.4, float(across) + _ASIDE, _DOWN)
+def _elapsed(recording: Recording) -> Array:
+    """(n,) [s] of each tick in the run's own time, which a faulty clock does not change."""
+    if recording.settings.ticks != "all":
+        return recording.elapsed()
+    hz = recording.settings.scenario.simulation.control_hz
+    return np.arange(len(recording.ticks), dtype=np.float64) * (1.0 / hz)
+
+
+def _with_clouds(
+    recording: Recording, controller: str | None, rows: Sequence[int]
+) -> Iterator[tuple[int, Tick, Clouds]]:
+    """The ticks of these rows, as recorded, or computed again where the clouds are not recorded."""
+    if controller is None and recording.has_clouds:
+        for row in rows:
+            clouds = recording.clouds(row)
+            assert clouds is not None
+            yield row, recording.ticks[row], clouds
+        return
+    replay = Replay(recording, controller)
+    for row, tick in enumerate(replay):
+        if row in rows:
+            yield row, tick, Clouds.of(replay.ctrl)
+        if row >= max(rows, default=-1):
+            return
 
 
 def draw(
@@ -91,45 +91,6 @@ def draw(
     """(height, width, 3) of one snapshot. Raises: SimulationError where nothing can draw."""
     world.place(snapshot.q, snapshot.elapsed)
     return world.picture(list(_marks(snapshot)), size, camera)
-
-
-def animate(
-    recording: Recording,
-    path: str | Path,
-    fps: float = 8.0,
-    *,
-    size: tuple[int, int] = (480, 360),
-    camera: Camera | None = None,
-    seconds: float | None = None,
-) -> Path:
-    """Writes the run as a GIF that plays in real time.
-
-    Args:
-        recording: of a run.
-        path: where to.
-        fps: pictures a second.
-        size: width and height in pixels.
-        camera: where to look from.
-        seconds: of the run; left out: all.
-
-    Raises:
-        ConfigError: the file cannot be written.
-        SimulationError: nothing can draw here.
-    """
-    end = recording.ticks[-1].inputs.time if recording.ticks else 0.0
-    times = np.arange(0.0, min(end, seconds or end) + 1e-9, 1.0 / fps)
-    replay = Replay(recording)
-    scenario = replay.setup.scenario
-    world = World(replay.setup.robot, scenario.drawn(), scenario.floor, replay.setup.scene.names)
-    try:
-        frames = [
-            Image.fromarray(draw(world, snapshot, size, camera or viewpoint(replay.setup)))
-            for snapshot in recorded_moments(recording, times.tolist())
-        ]
-    finally:
-        world.close()
-    write_gif(frames, Path(path), fps)
-    return Path(path)
 
 
 def write_gif(frames: Sequence[Image.Image], path: Path, fps: float) -> None:
@@ -162,8 +123,8 @@ def write_gif(frames: Sequence[Image.Image], path: Path, fps: float) -> None:
 
 def _marks(snapshot: RecordedMoment) -> Iterator[Spheres | Arrow]:
     result, goal = snapshot.tick.result, snapshot.tick.inputs.goal
-    yield Spheres(without(snapshot.raw_W, snapshot.cloud_W), 0.005, _RAW)
-    yield Spheres(snapshot.cloud_W, 0.008, _FILTERED)
+    yield Spheres(snapshot.clouds.removed_W.astype(np.float64), 0.005, _RAW)
+    yield Spheres(snapshot.clouds.kept_W.astype(np.float64), 0.008, _FILTERED)
     if result.control_W is not None and result.obstacle_W is not None:
         yield Arrow(np.array(result.control_W), np.array(result.obstacle_W), 0.012, _PAIR)
     for axis, color in enumerate(_AXES):

@@ -1,7 +1,5 @@
 """A recording's inputs, given to a controller again."""
 
-from __future__ import annotations
-
 import time as clock
 import warnings
 from collections.abc import Iterator, Sequence
@@ -74,13 +72,13 @@ class Replay:
         self.ctrl = self.setup.make_controller(self.controller, room)
 
     def __iter__(self) -> Iterator[Tick]:
-        """Ticks with the new answers; `law` then holds the state after the yielded one."""
+        """Ticks with the new answers; `ctrl` then holds the state after the yielded one."""
         inputs = [
             replace(tick.inputs, known=self._known is not None) for tick in self.recording.ticks
         ]
         ticks = run_ticks(RecordedSource(inputs), self.ctrl, None, self._known)
-        for then, (given_now, result) in zip(self.recording.ticks, ticks, strict=True):
-            yield Tick(given_now, result, then.truth)
+        for then, (now, result) in zip(self.recording.ticks, ticks, strict=True):
+            yield Tick(now, result, then.truth)
 
 
 def recompute(

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from html import escape
 
-from proxcgal.evaluation.metrics import COVERAGE_KEYS, SELF_LIMIT_M, shown
+from proxcgal.core.tables import in_metres
+from proxcgal.evaluation.metrics import COVERAGE_KEYS, SELF_LIMIT_M
 from proxcgal.report.document import Pictures, document, origin_part, recordings_part
 from proxcgal.report.html_table import cell, head, table_part
 from proxcgal.report.replays import Replays
@@ -94,7 +95,7 @@ def _pictures(run: StoredRun) -> Iterator[tuple[str, str]]:
                 for controller in SIDE_BY_SIDE
                 if controller in run.summary.controllers
             }
-            near = [f"{c} {shown(value)} m" for c, value in least.items() if value is not None]
+            near = [f"{c} {in_metres(value)} m" for c, value in least.items() if value is not None]
             start = "The arm in motion" + (f"; least true distance: {', '.join(near)}" * bool(near))
             yield name, f"{start}. {caption}"
         else:
@@ -153,7 +154,7 @@ def _phases(run: StoredRun) -> Iterator[str]:
     rows = [
         [_named(name)]
         + [
-            cell(shown(numbers.mean_m.get(phase, {}).get(which)))
+            cell(in_metres(numbers.mean_m.get(phase, {}).get(which)))
             for phase in phases
             for which in ("true", "seen")
         ]
@@ -198,7 +199,7 @@ def _rows(run: StoredRun) -> Iterator[Iterator[str]]:
             yield cell(summary.scenario, "left", rows=count)
         yield _named(name)
         for value in (own.true_min_m, own.true_final_m, own.seen_min_m, own.goal_error_m):
-            yield cell(shown(value))
+            yield cell(in_metres(value))
         yield cell("-" if own.violations is None else own.violations)
         if place == 0:
             yield cell("-" if gain is None else f"{gain:+.0f}", rows=count)
@@ -216,14 +217,15 @@ def _verdict(runs: Sequence[StoredRun]) -> Iterator[str]:
             yield (
                 f"<p>In <b>{escape(run.summary.scenario)}</b> the whole-body law ends "
                 f"{abs(gain):.0f} mm {more} the obstacle than the sensor-point baseline, truly: "
-                f"{shown(ends['wb'].true_final_m)} m against {shown(ends['sm'].true_final_m)} m."
+                f"{in_metres(ends['wb'].true_final_m)} m against "
+                f"{in_metres(ends['sm'].true_final_m)} m."
                 "</p>"
             )
         own = run.summary.self_min_m
         if run.summary.failed:
             yield (
                 f'<p class="bad">{escape(run.summary.scenario)}: failed: the arm came within '
-                f"{shown(own)} m of itself, allowed is {SELF_LIMIT_M} m.</p>"
+                f"{in_metres(own)} m of itself, allowed is {SELF_LIMIT_M} m.</p>"
             )
     yield (
         '<p class="soft">Reaching the goal is not asked for: keeping the distance comes first. '
@@ -272,7 +274,7 @@ def _trials(run: StoredRun) -> Iterator[str]:
         [
             cell(name, "left"), cell(f"{trial.tick_median_us:.0f}"),
             cell(f"{trial.tick_p99_us:.0f}"), cell(f"{trial.wall_s:.1f}"),
-            cell(shown(own.get(name))),
+            cell(in_metres(own.get(name))),
             cell(", ".join(f"{why}: {n}" for why, n in trial.findings.items()) or "none", "text"),
         ]
         for name, trial in run.about.trials.items()

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from proxcgal.core.errors import ConfigError
-from proxcgal.evaluation.metrics import write_text
+from proxcgal.core.files import write_text
 from proxcgal.report.campaign_page import campaign_page
 from proxcgal.report.joint_page import joint_page
 from proxcgal.report.runs_page import runs_page

@@ -1,170 +1,29 @@
-"""Scenario files: one TOML file says what is simulated; every problem in it is told at once."""
-
-from __future__ import annotations
+"""Scenario files: one TOML file says what is simulated; every problem in it is reported at once."""
 
 from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any
 
-from pydantic import Field, ValidationError
+from pydantic import ValidationError
 
 from proxcgal.core import toml
 from proxcgal.core.errors import ConfigError
 from proxcgal.models.formats.paths import is_robot_file
-from proxcgal.scenario.controller import Controller
-from proxcgal.scenario.keys import (
-    Fault,
-    Goal,
-    Limits,
-    Obstacle,
-    Positive,
-    Section,
-    Simulation,
-    Skin,
-)
+from proxcgal.scenario.hri_scenario import HriScenario
+from proxcgal.scenario.joint_scenario import JointScenario
 from proxcgal.scenario.problems import lines
-from proxcgal.scene.human.operator import Operator
-from proxcgal.scene.human.person import Person, person_of
-from proxcgal.scene.obstacles import ObstacleScene, Scene, Together
+from proxcgal.scenario.scenario import Scenario
+from proxcgal.scenario.walkthrough_scenario import GuidedScenario, WalkScenario
 
-if TYPE_CHECKING:
-    from proxcgal.scenario.joint import Finish
-
-#: wb: whole body; sm: sensor points; wb_known: whole body on points of the scene itself; wb_memory:
-#: whole body that remembers what left the sensors' view.
-CONTROLLERS = ("wb", "sm", "wb_known", "wb_memory")
-#: Those that run where nobody chooses: the paper's, and their ceiling.
-USUAL = ("wb", "sm", "wb_known")
-
-LONGEST = 1e5  #: [s] that a scene may last
-
-
-class Scenario(Section):
-    """A scene, a robot with its sensors, and what it is to do."""
-
-    name: str = Field("unnamed", description="left out in a file: the file's own name")
-    description: str = Field("", description="one line, shown in lists")
-    kind: Literal["static", "hri", "joint", "walkthrough", "guided"] = Field(
-        description="what kind of scene this is"
-    )
-    robot: str = Field(description="a built-in robot's name, or a path to .urdf or .xml")
-    package_dirs: tuple[str, ...] = Field(
-        (), description="where package:// paths of the robot's file are looked up"
-    )
-    vertices_per_link: int = Field(
-        1000, ge=0, description="of the controller's meshes, 0: as they are; the simulator's are"
-    )
-    q0: tuple[float, ...] = Field(min_length=1, description="[rad] or [m] joint positions at 0 s")
-    duration: Positive = Field(le=LONGEST, description="[s] at most 100000")
-    perception: Literal["sensed", "known"] = Field(
-        "sensed", description="what the controller gets: scans, or points of the scene itself"
-    )
-    seed: int = Field(0, ge=0, lt=2**63, description="fixes every random draw")
-    goal: Goal
-    limits: Limits = Field(default_factory=Limits)
-    skin: Skin
-    controller: Controller = Field(default_factory=Controller)
-    simulation: Simulation = Field(default_factory=Simulation)
-    obstacles: tuple[Obstacle, ...] = Field((), alias="obstacle")
-    faults: tuple[Fault, ...] = Field((), alias="fault")
-
-    def scene(self) -> Scene:
-        """What stands and moves beside the robot and can be sensed."""
-        return ObstacleScene([obstacle for obstacle in self.obstacles if obstacle.sensed])
-
-    def measured(self) -> Scene:
-        """What true distances run to."""
-        return self.scene()
-
-    def drawn(self) -> Scene:
-        """All that is there."""
-        return ObstacleScene(self.obstacles)
-
-    def start(self) -> tuple[str, tuple[float, ...]]:
-        """Joint positions at 0 s, and the key that gives them."""
-        return "q0", self.q0
-
-    def controllers(self) -> tuple[str, ...]:
-        """Those of a run that names none."""
-        return USUAL
-
-    def ends(self) -> Finish | None:
-        """When a run is over before its time; None: never."""
-        return None
-
-    @property
-    def floor(self) -> float:
-        """Height of the floor in pictures [m]; sensors see none."""
-        return 0.0
-
-    def to_toml(self) -> str:
-        """The file that gives this scenario again, with every default written out."""
-        return toml.write(self.model_dump(by_alias=True))
-
-
-class HriScenario(Scenario):
-    """A person walks in and works beside the arm; distances run to that person alone."""
-
-    operator: Operator
-
-    def person(self) -> Person:
-        """Who works there.
-
-        Raises:
-            ConfigError: a recording that cannot be read; a place out of reach, or not in time.
-        """
-        return person_of(self.operator, self.duration)
-
-    def scene(self) -> Scene:
-        """The person, and what else can be sensed."""
-        return Together(self.person(), super().scene())
-
-    def measured(self) -> Scene:
-        """The person."""
-        return self.person()
-
-    def drawn(self) -> Scene:
-        """The person, and all that stands round."""
-        return Together(self.person(), super().drawn())
-
-    @property
-    def floor(self) -> float:
-        """Height of the floor that the person stands on [m]; sensors see none."""
-        return self.operator.floor
-
-    def signals(self) -> list[tuple[float, str]]:
-        """Time [s] and note of every signal of the timeline; none that a recording heeds."""
-        if self.operator.recording is not None:
-            return []
-        return [(step.at, step.note) for step in self.operator.timeline]
-
-    @property
-    def on_the_left(self) -> bool:
-        """Does the person work on the arm's left?"""
-        step = self.operator.timeline[0]
-        return self.operator.marks[step.mark][1] > 0.0
-
-    def windows(self) -> dict[str, tuple[float, float]]:
-        """Start and end of every phase that is reported, by name [s]."""
-        steps = self.operator.timeline
-        ends = [*(step.at for step in steps[1:]), self.duration]
-        return {
-            step.phase: (step.at, end)
-            for step, end in zip(steps, ends, strict=True)
-            if step.phase is not None
-        }
-
-
-def kinds() -> dict[str, type[Scenario]]:
-    """The class of each `kind`."""
-    from proxcgal.scenario.joint import JointScenario  # made from Scenario, as those below
-    from proxcgal.scenario.walkthrough import GuidedScenario, WalkScenario
-
-    return {
-        "static": Scenario, "hri": HriScenario, "joint": JointScenario,
-        "walkthrough": WalkScenario, "guided": GuidedScenario,
-    }  # fmt: skip
+#: The class of each `kind`.
+KINDS: dict[str, type[Scenario]] = {
+    "static": Scenario,
+    "hri": HriScenario,
+    "joint": JointScenario,
+    "walkthrough": WalkScenario,
+    "guided": GuidedScenario,
+}
 
 
 def list_scenarios() -> dict[str, str]:
@@ -220,7 +79,7 @@ def change_scenario(scenario: Scenario, origin: str, overrides: Sequence[str]) -
 def _checked(table: dict[str, Any], origin: str, overrides: Sequence[str]) -> Scenario:
     keys = [toml.override(table, assignment) for assignment in overrides]
     kind = table.get("kind", "static")
-    model = kinds().get(kind, Scenario) if isinstance(kind, str) else Scenario
+    model = KINDS.get(kind, Scenario) if isinstance(kind, str) else Scenario
     try:
         return model.model_validate(_tuples(table))
     except ValidationError as error:
@@ -234,18 +93,20 @@ def _built_in() -> list[Path]:
 
 def _anchor(table: dict[str, Any], folder: Path) -> None:
     """Paths in a file are relative to that file, wherever it is read from."""
-    robot = table.get("robot")
-    if isinstance(robot, str) and is_robot_file(robot):
-        table["robot"] = str((folder / robot).absolute())
-    ratings = table.get("ratings")
-    if isinstance(ratings, str):
-        table["ratings"] = str((folder / ratings).absolute())
-    operator = table.get("operator")
-    if isinstance(operator, dict) and isinstance(operator.get("recording"), str):
-        operator["recording"] = str((folder / operator["recording"]).absolute())
+
+    def anchored(place: str) -> str:
+        return str((folder / place).absolute())
+
+    for owner, key in ((table, "robot"), (table, "ratings"), (table.get("operator"), "recording")):
+        if (
+            isinstance(owner, dict)
+            and isinstance(place := owner.get(key), str)
+            and (key != "robot" or is_robot_file(place))
+        ):
+            owner[key] = anchored(place)
     places = table.get("package_dirs")
     if isinstance(places, list) and all(isinstance(place, str) for place in places):
-        table["package_dirs"] = [str((folder / place).absolute()) for place in places]
+        table["package_dirs"] = [anchored(place) for place in places]
 
 
 def _tuples(value: Any) -> Any:

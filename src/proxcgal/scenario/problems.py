@@ -1,7 +1,5 @@
 """What is wrong with a scenario file, one line per problem: file, key, value, what is allowed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Any, get_args, get_origin
 

@@ -1,7 +1,5 @@
 """From a scenario to what runs: robot, sensors, controller settings, start and goal."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Self
@@ -12,10 +10,10 @@ from proxcgal import _core
 from proxcgal.core import transforms
 from proxcgal.core.errors import ConfigError
 from proxcgal.core.typing import Array
-from proxcgal.models import Robot, load_robot, macro_micro, ring_skin
-from proxcgal.scenario.controller import Controller
-from proxcgal.scenario.keys import Section
-from proxcgal.scenario.loading import CONTROLLERS, Scenario
+from proxcgal.models import macro_micro
+from proxcgal.models.robots import Robot, load_robot
+from proxcgal.models.skins import ring_skin
+from proxcgal.scenario.scenario import CONTROLLERS, Scenario
 from proxcgal.scene.obstacles import KnownCloud, Scene
 
 
@@ -76,19 +74,19 @@ class Setup:
             raise ConfigError(f"controller {controller!r}: there are {', '.join(CONTROLLERS)}")
         settings = self.scenario.controller
         remembers, tracks = controller == "wb_memory", controller in settings.motion.controllers
-        motion = {k: v for k, v in _keys(settings.motion).items() if k != "controllers"}
+        motion = {k: v for k, v in settings.motion.model_dump().items() if k != "controllers"}
         config = _core.ControllerConfig(
             control_point="sensor" if controller == "sm" else "whole_body",
             tasks=self.make_tasks(),
-            filter=_core.FilterConfig(**_keys(settings.filter)),
-            solver=_core.SolverConfig(**_keys(settings.solver)),
-            monitor=_core.MonitorConfig(**_keys(settings.monitor)),
+            filter=_core.FilterConfig(**settings.filter.model_dump()),
+            solver=_core.SolverConfig(**settings.solver.model_dump()),
+            monitor=_core.MonitorConfig(**settings.monitor.model_dump()),
             period=1.0 / self.scenario.simulation.control_hz,
             min_row_norm=settings.min_row_norm,
             avoid_links=list(settings.avoid_links),
             method=settings.method,
             max_points=max(known_points, 1),
-            memory=_core.MemoryConfig(**_keys(settings.memory)) if remembers else None,
+            memory=_core.MemoryConfig(**settings.memory.model_dump()) if remembers else None,
             motion=_core.MotionConfig(**motion) if tracks else None,
         )
         return _core.Controller(self.robot, self.skin, config)
@@ -100,22 +98,42 @@ class Setup:
     def _task(self, name: str) -> Any:
         """One level's settings for the core. Raises: ConfigError: two arms that are not there."""
         settings = self.scenario.controller
-        if name == "self_collision":
-            return _core.SelfCollision(
-                **_keys(settings.self_collision),
-                pairs=macro_micro.watched_pairs(
-                    self.robot, settings.macro_joints, settings.self_collision.d_min
-                ),
-            )
-        if name in ("manipulability_macro", "manipulability_micro"):
-            first, joints = macro_micro.part(
-                self.robot, settings.macro_joints, name.rpartition("_")[2]
-            )
-            return _core.Manipulability(
-                **_keys(settings.arm_manipulability), first_joint=first, joints=joints,
-                unit=macro_micro.largest_manipulability(self.robot, first, joints),
-            )  # fmt: skip
-        return _task(name, settings)
+        match name:
+            case "self_collision":
+                return _core.SelfCollision(
+                    **settings.self_collision.model_dump(),
+                    pairs=macro_micro.watched_pairs(
+                        self.robot, settings.macro_joints, settings.self_collision.d_min
+                    ),
+                )
+            case "manipulability_macro" | "manipulability_micro":
+                arm = name.rpartition("_")[2]
+                first, joints = macro_micro.part(self.robot, settings.macro_joints, arm)
+                return _core.Manipulability(
+                    **settings.arm_manipulability.model_dump(),
+                    first_joint=first,
+                    joints=joints,
+                    unit=macro_micro.largest_manipulability(self.robot, first, joints),
+                )
+            case "manipulability":
+                return _core.Manipulability(**settings.manipulability.model_dump())
+            case "avoidance":
+                return _core.Avoidance(
+                    d_min=settings.d_min,
+                    buffer=settings.buffer,
+                    gain=settings.avoid_gain,
+                    nearest=settings.nearest,
+                )
+            case "joint_limits":
+                return _core.JointLimits(**settings.joint_limits.model_dump())
+            case "minimum_altitude":
+                return _core.MinimumAltitude(**settings.minimum_altitude.model_dump())
+        return _core.Reach(  # of all six rows, or those of the position or the orientation
+            gain=settings.reach_gain,
+            max_linear=settings.max_linear,
+            max_angular=settings.max_angular,
+            rows=name.removeprefix("reach").removeprefix("_") or "both",
+        )
 
     def mesh_hashes(self) -> dict[str, str]:
         """SHA-256 of each link's meshes, as `LINK full` and `LINK control`."""
@@ -139,7 +157,7 @@ def make_robot(scenario: Scenario) -> Robot:
 
 def make_skin(scenario: Scenario, robot: Robot) -> _core.Skin:
     """The scenario's sensors on this robot. Raises: ConfigError for a link it does not have."""
-    model = _core.SensorModel(**_keys(scenario.skin.sensor))
+    model = _core.SensorModel(**scenario.skin.sensor.model_dump())
     _require(scenario, _unknown_links(scenario, robot))
     skin = _core.Skin([], model)
     for ring in scenario.skin.fitted:
@@ -156,17 +174,12 @@ def require_fit(scenario: Scenario, robot: Robot) -> None:
     key, values = scenario.start()
     unknown = [
         f"controller.avoid_links.{place} = {link!r}: {_links(robot)}"
-        for place, link in enumerate(_avoided(scenario))
+        for place, link in enumerate(scenario.controller.avoid_links)
         if link not in robot.link_names
     ]
     _require(
         scenario, posture_problems(robot, values, key) + _unknown_links(scenario, robot) + unknown
     )
-
-
-def _avoided(scenario: Scenario) -> Sequence[str]:
-    """Links that the scenario names to be kept away; a walk-through has no controller."""
-    return getattr(getattr(scenario, "controller", None), "avoid_links", ())
 
 
 def _unknown_links(scenario: Scenario, robot: Robot) -> list[str]:
@@ -212,32 +225,6 @@ def _goals(scenario: Scenario, robot: Robot, q0: Array) -> tuple[Array, ...]:
         T_WT = start.copy()
         T_WT[:3, 3] = place
         if goal.rpy is not None:
-            T_WT[:3, :3] = transforms.rotation(goal.rpy)
+            T_WT[:3, :3] = transforms.rotation_from_rpy(goal.rpy)
         goals.append(T_WT)
     return tuple(goals)
-
-
-def _task(name: str, settings: Controller) -> Any:
-    match name:
-        case "manipulability":
-            return _core.Manipulability(**_keys(settings.manipulability))
-        case "avoidance":
-            return _core.Avoidance(
-                d_min=settings.d_min, buffer=settings.buffer, gain=settings.avoid_gain,
-                nearest=settings.nearest,
-            )  # fmt: skip
-        case "reach" | "reach_position" | "reach_orientation":
-            return _core.Reach(
-                gain=settings.reach_gain, max_linear=settings.max_linear,
-                max_angular=settings.max_angular,
-                rows=name.removeprefix("reach").removeprefix("_") or "both",
-            )  # fmt: skip
-        case "joint_limits":
-            return _core.JointLimits(**_keys(settings.joint_limits))
-        case "minimum_altitude":
-            return _core.MinimumAltitude(**_keys(settings.minimum_altitude))
-    raise ConfigError(f"task {name!r} is unknown")
-
-
-def _keys(section: Section) -> dict[str, Any]:
-    return section.model_dump()

@@ -1,14 +1,13 @@
 """A hand that is moved takes its arm along, which bounds how far it goes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from proxcgal.core.transforms import least_rotation, perpendicular
 from proxcgal.core.typing import Array
-from proxcgal.scene.solids import Capsule, Solid
+from proxcgal.scene.solids import CapsuleSolid, Solid
 
 _STRETCHED = 0.999  # of both lengths: an arm is never quite straight
 
@@ -45,7 +44,7 @@ class ArmFollower:
         aside = elbow - shoulder
         aside = aside - (aside @ along) * along
         if np.linalg.norm(aside) < 1e-6:
-            aside = _across(along)
+            aside = -perpendicular(along)
         aside /= np.linalg.norm(aside)
         elbow = shoulder + share * along + np.sqrt(max(upper**2 - share**2, 0.0)) * aside
         _span(poses[self.upper], elbow, shoulder)
@@ -61,7 +60,7 @@ def arm_followers(names: Sequence[str], solids: Sequence[Solid]) -> list[ArmFoll
         if side == name or not all(part in names for part in parts):
             continue
         rows = [list(names).index(part) for part in parts]
-        capsules = [solid for row in rows if isinstance(solid := solids[row], Capsule)]
+        capsules = [solid for row in rows if isinstance(solid := solids[row], CapsuleSolid)]
         if len(capsules) == len(rows):
             upper, fore, hand = (capsule.length for capsule in capsules)
             found.append(ArmFollower(name, rows[0], rows[1], rows[2], (upper, fore, hand)))
@@ -76,24 +75,5 @@ def _end(pose: Array, along: float) -> Array:
 def _span(pose: Array, low: Array, high: Array) -> None:
     """Turns a capsule the least that brings its axis from `low` to `high`, and puts it between."""
     z = (high - low) / max(float(np.linalg.norm(high - low)), 1e-12)
-    pose[:3, :3] = _turn(pose[:3, 2], z) @ pose[:3, :3]
+    pose[:3, :3] = least_rotation(pose[:3, 2], z) @ pose[:3, :3]
     pose[:3, 3] = 0.5 * (low + high)
-
-
-def _across(a: Array) -> Array:
-    """A unit vector at a right angle to another."""
-    across: Array = np.cross(a, np.eye(3)[np.argmin(np.abs(a))])
-    across /= np.linalg.norm(across)
-    return across
-
-
-def _turn(a: Array, b: Array) -> Array:
-    """(3, 3) the least rotation from one unit vector to another."""
-    v, c = np.cross(a, b), float(a @ b)
-    if c < -1.0 + 1e-9:  # half a turn, about any axis across
-        axis = _across(a)
-        half: Array = 2.0 * np.outer(axis, axis) - np.eye(3)
-        return half
-    K = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
-    turn: Array = np.eye(3) + K + K @ K / (1.0 + c)
-    return turn

@@ -1,7 +1,5 @@
 """Solids of a scene that somebody holds and moves; the others go their own way."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

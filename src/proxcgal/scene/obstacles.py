@@ -12,7 +12,7 @@ from proxcgal.core.typing import Array
 from proxcgal.scene.solids import Solid
 
 if TYPE_CHECKING:
-    from proxcgal.scenario.keys import Obstacle
+    from proxcgal.scene.obstacle_keys import Obstacle
 
 
 class Scene(Protocol):

@@ -4,9 +4,7 @@ Axis z, origin at the centre, metres. The surface is all that lies `rounding` fr
 triangles: a capsule is its axis, rounded.
 """
 
-from __future__ import annotations
-
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,10 +117,10 @@ class Cylinder(_Sharp):
         return out
 
 
-@dataclass(frozen=True, slots=True)
-class Capsule:
-    """All within `radius` of a segment of this length."""
+class _Rounded:
+    """All within `radius` of a segment along z of some length."""
 
+    __slots__ = ()
     radius: float
     length: float
 
@@ -165,35 +163,22 @@ class Capsule:
 
 
 @dataclass(frozen=True, slots=True)
-class Sphere:
+class CapsuleSolid(_Rounded):
+    """All within `radius` of a segment of this length."""
+
+    radius: float
+    length: float
+
+
+@dataclass(frozen=True, slots=True)
+class Sphere(_Rounded):
     """All within `radius` of a point."""
 
     radius: float
-
-    @property
-    def rounding(self) -> float:
-        """[m] between core and surface."""
-        return self.radius
-
-    @property
-    def extent(self) -> Array:
-        """(3,) half edge lengths of the box round it."""
-        return np.full(3, self.radius)
-
-    def core(self) -> Mesh:
-        """Its centre, a triangle 1 um wide."""
-        return Capsule(self.radius, 0.0).core()
-
-    def points(self, spacing: float) -> Array:
-        """(n, 3) points of the surface, at most `spacing` apart along rings and meridians."""
-        return Capsule(self.radius, 0.0).points(spacing)
-
-    def nearest(self, point_O: Array) -> Array:
-        """(3,) the point of the solid nearest to a point."""
-        return Capsule(self.radius, 0.0).nearest(point_O)
+    length: float = field(default=0.0, init=False, repr=False)
 
 
-Solid = Box | Cylinder | Capsule | Sphere
+Solid = Box | Cylinder | CapsuleSolid | Sphere
 
 
 def _ticks(edge: float, spacing: float) -> Array:

@@ -79,7 +79,7 @@ class GoalLedger(Generic[P]):
 
         Args:
             outcome: of it.
-            reason: in words.
+            reason: as text.
             time: [s].
             errors: [m] and [rad] that remain.
         """

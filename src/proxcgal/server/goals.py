@@ -3,8 +3,6 @@
 Source: [JR] 3.2.1 and 4.1.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,7 +14,7 @@ from proxcgal.core import transforms
 from proxcgal.core.errors import ProxError
 from proxcgal.core.typing import Array
 from proxcgal.evaluation.termination import Outcome
-from proxcgal.models import Robot
+from proxcgal.models.robots import Robot
 from proxcgal.scenario.setup import posture_problems
 
 State = Literal["starting", "executing", "cancelling", "succeeded", "aborted", "cancelled"]
@@ -100,10 +98,10 @@ def goal_pose(goal: JointGoal, T_WE: Array) -> Array:
     Source: [JR] (4.2) to (4.6); (4.6) forgets to rotate, so here it is r_ee + R_ee r_goal.
     """
     T_WT = np.eye(4)
-    turn = None if goal.rpy is None else transforms.rotation(goal.rpy)  # (4.2)
+    turn = None if goal.rpy is None else transforms.rotation_from_rpy(goal.rpy)  # (4.2)
     if goal.frame == END_EFFECTOR:
         T_WT[:3, :3] = T_WE[:3, :3] if turn is None else T_WE[:3, :3] @ turn  # (4.4)
-        T_WT[:3, 3] = T_WE[:3, 3] + T_WE[:3, :3] @ np.asarray(goal.translation)  # (4.6), mended
+        T_WT[:3, 3] = T_WE[:3, 3] + T_WE[:3, :3] @ np.asarray(goal.translation)  # (4.6), corrected
     else:
         T_WT[:3, :3] = T_WE[:3, :3] if turn is None else turn  # (4.3)
         T_WT[:3, 3] = goal.translation  # (4.5)
@@ -141,7 +139,7 @@ def reach_problem(reach: tuple[Array, float], T_WT: Array) -> str | None:
     )
 
 
-def _told(values: object) -> str:
+def _short_text(values: object) -> str:
     try:
         return str(values)[:80]
     except ValueError:  # Python does not write integers of so many digits
@@ -151,13 +149,13 @@ def _told(values: object) -> str:
 def _three(name: str, values: object) -> str | None:
     """Why these are not three finite numbers; None where they are."""
     try:
-        if not isinstance(values, Sequence | np.ndarray) or isinstance(values, str):
-            raise TypeError
-        if len(values) != 3:
-            raise TypeError
-        if any(isinstance(value, bool | str) for value in values):
+        if (
+            not isinstance(values, Sequence | np.ndarray)
+            or len(values) != 3
+            or any(isinstance(value, bool | str) for value in values)
+        ):
             raise TypeError
         finite = all(math.isfinite(value) for value in values)
     except (TypeError, OverflowError):
-        return f"{name} = {_told(values)}: must be three finite numbers"
+        return f"{name} = {_short_text(values)}: must be three finite numbers"
     return None if finite else f"{name} = {list(values)}: must be finite"

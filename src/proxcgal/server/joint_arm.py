@@ -1,21 +1,21 @@
-"""The 12-joint arm, simulated: it follows its velocity commands exactly, one tick after another."""
-
-from __future__ import annotations
+"""The 12-joint arm, simulated: a source of the common loop that follows one goal after another."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from proxcgal import _core
 from proxcgal.core.modes import STOP
 from proxcgal.core.typing import Array
-from proxcgal.models import Robot
 from proxcgal.models.macro_micro import tool_jacobian
-from proxcgal.scenario.joint import JointScenario
+from proxcgal.models.robots import Robot
+from proxcgal.scenario.joint_scenario import JointScenario
+from proxcgal.scenario.loading import change_scenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.server.goals import AT_REST
-from proxcgal.sim.tick import Tick, TickInput, TickResult, TickTruth
+from proxcgal.sim.actuation import Actuation
+from proxcgal.sim.loop import run_ticks
+from proxcgal.sim.tick import TickInput, TickResult
 
 
 class JointArm:
@@ -24,14 +24,11 @@ class JointArm:
     def __init__(self, scenario: JointScenario, robot: Robot | None) -> None:
         """At rest in the first initial configuration. Raises: ProxError, what does not fit."""
         self.setup = Setup.of(scenario, robot)  #: with the goal that is followed
-        self.q: Array = self.setup.q0.copy()  #: (n_q,)
-        self.qd: Array = np.zeros_like(self.q)  #: (n_q,) of the last command
         self.time = 0.0  #: [s]
         self.last: TickResult | None = None  #: of the controller's last tick
         self._cloud = self.setup.known_cloud()
-        self._ticks = 0
-        self.ctrl = self._made()
-        self._held = self.tool
+        self._start(self.setup.q0)
+        self._goal = self._held = self.tool
 
     @property
     def robot(self) -> Robot:
@@ -49,6 +46,16 @@ class JointArm:
     def period(self) -> float:
         """[s] from tick to tick."""
         return float(self.ctrl.config.period)
+
+    @property
+    def q(self) -> Array:
+        """(n_q,)."""
+        return self._actuation.q
+
+    @property
+    def qd(self) -> Array:
+        """(n_q,) of the last command."""
+        return self._actuation.qd
 
     @property
     def tool(self) -> Array:
@@ -77,13 +84,13 @@ class JointArm:
 
     def set_tasks(self, tasks: Sequence[str], off: Sequence[str]) -> None:
         """Another stack; the commands go on. Raises: ConfigError, an unknown name."""
-        from proxcgal.scenario.loading import change_scenario
-
         changes = [f"controller.{k}={list(v)!r}" for k, v in (("tasks", tasks), ("off", off))]
         changed = change_scenario(self.setup.scenario, "tasks", changes)
         self.setup = replace(self.setup, scenario=changed)
-        self.ctrl = self._made()
-        self.ctrl.go_on_from(self.qd)  # the arm may still come to rest after its last goal
+        qd = self.qd
+        self._start(self.q)
+        self._actuation.qd = qd
+        self.ctrl.go_on_from(qd)  # the arm may still come to rest after its last goal
 
     def reset(self) -> bool:
         """Leaves a STOP of the monitor; False while its cause lasts, and where there is none."""
@@ -94,9 +101,7 @@ class JointArm:
 
     def place(self, configuration: str) -> None:
         """Puts it into a configuration, at rest, as [JR] does with its simulation."""
-        self.q = np.array(self.scenario.configurations[configuration])
-        self.qd = np.zeros_like(self.q)
-        self.ctrl = self._made()
+        self._start(np.array(self.scenario.configurations[configuration]))
 
     def follow(self, T_WT: Array) -> None:
         """A goal (4, 4) for the ticks that follow one."""
@@ -108,25 +113,32 @@ class JointArm:
 
     def move(self) -> None:
         """By the last command, for one period."""
-        self.q = self.q + self.qd * self.period
+        self._actuation.step()
 
     def tick(self, *, following: bool) -> None:
         """The next command: towards the goal, or to hold the tool."""
-        cloud, now = self._cloud, self._ticks * self.period
-        velocity_W = None if cloud.still else cloud.velocities(self.time)
-        goal = self.setup.goal if following else self._held
-        out = self.ctrl.tick_known(now, self.q, cloud(self.time), goal, velocity_W)
+        self._goal = self.setup.goal if following else self._held
+        _, self.last = next(self._loop)
         self._ticks += 1
         self.time += self.period
-        self.last = TickResult.of(out, 0, 0.0)
-        self.qd = self.last.qd
 
-    def asked(self) -> tuple[Tick, Array]:
-        """The last tick, and the points (n, 3) that it would be given now [m]."""
-        assert self.last is not None
-        inputs = TickInput(time=self.time, q=self.q, goal=self.setup.goal, known=True)
-        return Tick(inputs, self.last, TickTruth()), np.array(self._cloud(self.time))
+    def read(self) -> TickInput:
+        """The next tick's inputs: the arm's state and the goal, on points of the scene itself."""
+        return TickInput(self._ticks * self.period, self.q, self._goal, known=True)
 
-    def _made(self) -> _core.Controller:
-        self._ticks, self.last = 0, None
-        return self.setup.make_controller("wb_known", len(self._cloud))
+    def command(self, qd: Array) -> None:
+        """Velocity until the next tick (n_q,)."""
+        self._actuation.qd = qd
+
+    @property
+    def points_W(self) -> Array:  # noqa: N802  a frame's suffix
+        """(n, 3) points of the scene now [m]."""
+        return self._cloud(self.time)
+
+    def _start(self, q: Array) -> None:
+        """A new controller for the arm at rest at a posture; its clock begins at 0."""
+        self.ctrl = self.setup.make_controller("wb_known", len(self._cloud))
+        self._actuation = Actuation(q, self.period)
+        self._ticks = 0
+        self.last = None
+        self._loop = run_ticks(self, self.ctrl, known=self._cloud, begin=self.time)

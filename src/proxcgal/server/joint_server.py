@@ -4,8 +4,6 @@ The arm is simulated: it follows its velocity commands exactly, under the scenar
 points of the scene itself. Source: [JR] 3.2.1 (action server) and 4.1 (goals).
 """
 
-from __future__ import annotations
-
 import math
 import threading
 import time as clock
@@ -18,8 +16,8 @@ import numpy as np
 from proxcgal.core.closing import Closing
 from proxcgal.core.errors import ConfigError
 from proxcgal.core.typing import Array
-from proxcgal.models import Robot
-from proxcgal.scenario.joint import JointScenario
+from proxcgal.models.robots import Robot
+from proxcgal.scenario.joint_scenario import JointScenario
 from proxcgal.scenario.loading import load_scenario
 from proxcgal.server.goal_ledger import GoalLedger
 from proxcgal.server.goals import (

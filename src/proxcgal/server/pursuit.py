@@ -1,16 +1,13 @@
 """How the 12-joint arm pursues a goal, tick by tick, and why that ends."""
 
-from __future__ import annotations
-
 import threading
 from dataclasses import dataclass
 
-import numpy as np
-
 from proxcgal.core.errors import ProxError
+from proxcgal.core.transforms import pose_errors
 from proxcgal.core.typing import Array
 from proxcgal.evaluation.stall_diagnosis import concluded
-from proxcgal.evaluation.termination import Ending, GoalWatch, Outcome, pose_errors
+from proxcgal.evaluation.termination import Ending, GoalWatch, Outcome
 from proxcgal.server.goal_ledger import GoalLedger, Pursued
 from proxcgal.server.goals import JointGoal, goal_pose
 from proxcgal.server.joint_arm import JointArm
@@ -83,23 +80,18 @@ class JointPursuit:
 
     def _conclude(self, ending: Ending, active: PursuedGoal, *, wait: bool) -> None:
         arm = self._arm
-        if ending.outcome == "succeeded" or arm.last is None:
+        setup, last, q, time, points_W = arm.setup, arm.last, arm.q, arm.time, arm.points_W
+        if ending.outcome == "succeeded" or last is None:
             self.end(ending.outcome, ending.reason)
             if ending.outcome == "succeeded" and active.T_WT is not None:
                 arm.hold(active.T_WT)
             return
-        setup = arm.setup
-        last, points_W = arm.asked()
         if active.T_WT is not None:  # of the tick that the reason is about
-            tool = np.asarray(setup.robot.tool_pose(last.inputs.q))
-            active.remain = pose_errors(tool, active.T_WT)
+            active.remain = pose_errors(arm.tool, active.T_WT)
 
         def judge() -> None:
             try:
-                inputs = last.inputs
-                active.ending = concluded(
-                    setup, ending, last.result, inputs.q, points_W, inputs.time
-                )
+                active.ending = concluded(setup, ending, last, q, points_W, time)
             except ProxError:  # then without what held it
                 active.ending = ending
 
@@ -117,7 +109,7 @@ class JointPursuit:
 
         Args:
             outcome: of the goal.
-            reason: in words.
+            reason: as text.
             remain: [m] and [rad] to the goal; left out: from where the arm is now.
         """
         active = self._goals.active

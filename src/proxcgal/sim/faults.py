@@ -9,7 +9,7 @@ import numpy as np
 
 from proxcgal import _core
 from proxcgal.core.errors import ConfigError
-from proxcgal.scenario.keys import FAULT_VALUES, INPUT_FAULTS, MOUNT_FAULTS, Fault
+from proxcgal.scenario.fault_keys import FAULT_VALUES, INPUT_FAULTS, MOUNT_FAULTS, Fault
 from proxcgal.sim.range_sensor import NO_TARGET, VALID, ZONES
 from proxcgal.sim.tick import TickInput
 

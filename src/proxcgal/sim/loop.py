@@ -1,6 +1,4 @@
-"""The one way through: source -> injected faults -> tick; whoever iterates records."""
-
-from __future__ import annotations
+"""The one way through: source -> injected faults -> tick; the caller records."""
 
 import time as clock
 from collections.abc import Callable, Iterator
@@ -19,15 +17,17 @@ def run_ticks(
     ctrl: _core.Controller,
     faults: Callable[[TickInput], TickInput] | None = None,
     known: Cloud | None = None,
+    begin: float = 0.0,
 ) -> Iterator[tuple[TickInput, TickResult]]:
-    """Tick after tick until the source ends; `law` then holds the state after the yielded one.
+    """Tick after tick until the source ends; `ctrl` then holds the state after the yielded one.
 
     Args:
-        source: of inputs; it is told each command.
+        source: of inputs; it gets each command.
         ctrl: the controller.
         faults: between source and tick, such as a `FaultInjector`.
-        known: for ticks that are given the scene itself, where that is at the tick's place in the
-            run: the caller's clock may be what is faulty.
+        known: points of the scene itself, for ticks on those. Asked at the tick's place in the
+            run, because a fault may change the caller's clock.
+        begin: of the scene, at the first tick [s].
     """
     cloud = FixedCloud(np.empty((0, 3))) if known is None else known
     for tick in count():
@@ -36,7 +36,7 @@ def run_ticks(
         if faults is not None:
             inputs = faults(inputs)
         scans = list(inputs.scans)
-        elapsed = tick * ctrl.config.period
+        elapsed = begin + tick * ctrl.config.period
         points_W = cloud(elapsed if inputs.known else 0.0)
         velocity_W = None if cloud.still else cloud.velocities(elapsed)
         start, cpu = clock.perf_counter_ns(), clock.thread_time_ns()

@@ -1,20 +1,14 @@
 """One moment of a run as a page draws it: plain arrays, without the controller behind them."""
 
-from __future__ import annotations
-
-from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from proxcgal import _core
-from proxcgal.core.typing import Array
+from proxcgal.core.typing import Array, Bools
 from proxcgal.scenario.setup import Setup
+from proxcgal.sim.clouds import Clouds, Points
 from proxcgal.sim.tick import TickInput, TickResult
-
-Points = NDArray[np.float32]
 
 _NOTHING = 9.0  # [m] as far as that is nothing
 
@@ -33,7 +27,7 @@ class Posed:
     solids_W: Array  #: (solids, 4, 4) T_WO
     goal_W: Array | None  #: (4, 4) T_WT; None: there is none to draw
     hand_W: Array | None = None  #: (4, 4) of the hand at the tool, held or not; None: there is none
-    gripped: bool = False  #: does somebody who looks on hold that hand?
+    gripped: bool = False  #: does a user hold that hand?
     kept_W: Points = field(
         default_factory=_no_points
     )  #: (n, 3) the filtered cloud, without `held_W` [m]
@@ -66,35 +60,33 @@ class Moment(Posed):
         setup: Setup,
         inputs: TickInput,
         result: TickResult,
-        ctrl: _core.Controller | None,
+        clouds: Clouds | None,
         time: float,
         *,
         q: Array,
         true: float,
         since: float = 0.0,
-        off: Collection[int] = (),
+        held: Bools | None = None,
         hand_W: Array | None = None,
         gripped: bool = False,
     ) -> Self:
-        """Of a tick that `law` has just made.
+        """Of one tick.
 
         Args:
             setup: of the run.
             inputs: the tick's inputs.
             result: its answer.
-            ctrl: the controller, whose clouds are copied; None: clouds are not known.
+            clouds: the controller's after that tick; None: not known.
             time: the scene's, for its poses [s].
-            q: (n_q,) where the arm is, whatever the controller was told.
+            q: (n_q,) where the arm is, whatever a fault reports.
             true: distance from scene to robot [m].
             since: added to `time` in what is shown [s].
-            off: rows of the sensors that are silent.
+            held: (n,) true for the kept points of sensors that are silent; left out: none.
             hand_W: (4, 4) of a hand at the tool.
-            gripped: somebody who looks on holds it.
+            gripped: a user holds it.
         """
-        kept, raw, held = np.empty((0, 3)), np.empty((0, 3)), np.empty(0, bool)
-        if ctrl is not None:
-            kept, raw = ctrl.cloud_W(), ctrl.raw_cloud_W()
-            held = np.isin(ctrl.cloud_origins()[:, 0], list(off))
+        clouds = clouds or Clouds(_no_points(), _no_points())
+        held = np.zeros(len(clouds.kept_W), bool) if held is None else held
         return cls(
             elapsed=since + time,
             q=q,
@@ -103,9 +95,9 @@ class Moment(Posed):
             goal_W=inputs.goal,
             hand_W=hand_W,
             gripped=gripped,
-            kept_W=kept[~held].astype(np.float32),
-            held_W=kept[held].astype(np.float32),
-            removed_W=without(raw, kept).astype(np.float32),
+            kept_W=clouds.kept_W[~held],
+            held_W=clouds.kept_W[held],
+            removed_W=clouds.removed_W,
             control_W=result.control_W,
             obstacle_W=result.obstacle_W,
             link=result.control_link,
@@ -120,20 +112,7 @@ class Moment(Posed):
 
 
 def metres(distance: float) -> str:
-    """A distance in words; nan where nobody knows it, inf where there is nothing."""
+    """A distance as text; nan where it is unknown, inf where there is nothing."""
     if np.isnan(distance):
         return "unknown"
     return f"{distance:.3f} m" if distance < _NOTHING else "none"
-
-
-def without(points: Array, some: Array) -> Array:
-    """Those rows of (n, 3) that are not among the rows of `some`, bit for bit."""
-    if not len(points) or not len(some):
-        return points
-    left: Array = points[~np.isin(_rows(points), _rows(some))]
-    return left
-
-
-def _rows(points: Array) -> NDArray[np.void]:
-    """(n,) each row as one value that compares by its bytes."""
-    return np.ascontiguousarray(points).view(np.dtype((np.void, 3 * points.itemsize))).ravel()

@@ -1,33 +1,39 @@
-"""Where the simulated sensors really sit, and the look at the arm itself before a run."""
-
-from __future__ import annotations
+"""Where the simulated sensors really sit: injected mount faults."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from proxcgal import _core
-from proxcgal.core.errors import ConfigError
+from proxcgal.core.transforms import rotation_from_vector
 from proxcgal.core.typing import Array
-from proxcgal.models.mount_check import MountChecks, check_mounts
-from proxcgal.models.self_view import rotation_by
-from proxcgal.scenario.keys import MOUNT_FAULTS, Fault
+from proxcgal.models.robots import Robot
+from proxcgal.scenario.fault_keys import MOUNT_FAULTS, Fault
 from proxcgal.sim.faults import rows_of, value_of
 
-if TYPE_CHECKING:
-    from proxcgal.scenario.setup import Setup
-    from proxcgal.sim.source import SimulatedSource
-
-SCANS = 30  #: of each sensor before a run: 2 s at 15 Hz
 _STREAM = 3  # of the seed; noise and other faults draw from others
 
 
 class RealMounts:
     """The sensors' mounts in the world, which `mount_` faults move from where they should be."""
 
-    def __init__(self, mounts: Sequence[_core.Mount], faults: Sequence[Fault], seed: int) -> None:
-        """Args: `mounts` as the controller has them; `faults` of the scenario, whatever kind."""
+    def __init__(
+        self,
+        robot: Robot,
+        mounts: Sequence[_core.Mount],
+        faults: Sequence[Fault] = (),
+        seed: int = 0,
+    ) -> None:
+        """Resolves the faults.
+
+        Args:
+            robot: that carries the sensors.
+            mounts: as the controller has them.
+            faults: of the scenario, whatever kind.
+            seed: of the run.
+        """
+        self._robot, links = robot, list(robot.link_names)
+        self._links = np.array([links.index(mount.link) for mount in mounts], np.intp)
         self._T_LS: Array = np.array([mount.T_LS for mount in mounts]).reshape(-1, 4, 4)
         names = [mount.name for mount in mounts]
         self._moved: list[tuple[Fault, int, Array]] = []
@@ -42,8 +48,15 @@ class RealMounts:
                 if fault.kind == "mount_offset":
                     T_SS[:3, 3] = by
                 else:
-                    T_SS[:3, :3] = rotation_by(by)
+                    T_SS[:3, :3] = rotation_from_vector(by)
                 self._moved.append((fault, row, T_SS))
+
+    def poses_W(  # noqa: N802  a frame's suffix
+        self, q: Array, time: float, rows: Sequence[int] | slice = slice(None)
+    ) -> Array:
+        """(k, 4, 4) T_WS of these sensors at a posture (n_q,) and a time of the run [s]."""
+        poses: Array = self._robot.link_poses(q)[self._links[rows]] @ self.at(time)[rows]
+        return poses
 
     def at(self, time: float) -> Array:
         """(n, 4, 4) T_LS of every sensor at that time of the run."""
@@ -54,22 +67,3 @@ class RealMounts:
             if fault.start <= time and (fault.end is None or time < fault.end):
                 T_LS[row] = T_LS[row] @ T_SS
         return T_LS
-
-
-def look(setup: Setup, source: SimulatedSource) -> MountChecks:
-    """What the sensors' view of the arm at its start says of their mounts."""
-    return check_mounts(setup.robot, setup.skin, setup.q0, source.standing(SCANS))
-
-
-def require_mounts(setup: Setup, source: SimulatedSource) -> MountChecks:
-    """The same. Raises: ConfigError: mounts that are wrong, one line each."""
-    checks = look(setup, source)
-    if not checks:
-        name = setup.scenario.name
-        lines = [f"scenario {name}: skin: {check}" for check in checks.wrong]
-        raise ConfigError(
-            "\n".join(lines) + f"\nscenario {name}: sensors do not sit where the skin says, by "
-            "what they see of the arm itself; mend their mounts, or leave the check out with "
-            "skin.check_mounts=false"
-        )
-    return checks

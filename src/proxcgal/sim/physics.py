@@ -1,11 +1,9 @@
 """An arm with weight, drives and brakes: MuJoCo steps it, so that a stop is simulated, not assumed.
 
-Beside `world` the only module that knows MuJoCo. The drives follow velocity commands by computed
+Beside `world` the only module that imports MuJoCo. The drives follow velocity commands by computed
 torque, with a model that is a little wrong; once the torque is off, brakes close as dry friction in
 the joints, after the time that theirs take.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Sequence
@@ -17,35 +15,21 @@ import numpy as np
 from proxcgal.core.errors import ConfigError, SimulationError
 from proxcgal.core.typing import Array
 from proxcgal.models.formats.capsule_robot import CapsuleRobot
+from proxcgal.scenario.walkthrough_keys import HumanKeys
 
 #: Stiff, so that a held arm does not creep: MuJoCo's own friction gives way by a hundredth of the
 #: load's acceleration, which would be 0.3 deg/s here.
 _FRICTION_SOLREF = (0.004, 1.0)
 _FRICTION_SOLIMP = (0.999, 0.9999, 0.001, 0.5, 2.0)
+#: How the drives follow their commands. Ours: what industrial drives do.
+_DRIVE_FREQUENCY = 30.0  # [rad/s] of position errors, critically damped
+_MODEL_MASS, _MODEL_WEIGHT = 0.95, 0.97  # of the true ones, in the model of the drives
 _HUMAN = "human"
 _FAR = 10.0  # [m] distances are looked for up to here
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Drives:
-    """How the drives follow their commands. Ours: what industrial drives do."""
-
-    frequency: float = 30.0  #: [rad/s] of position errors, critically damped
-    model_mass: float = 0.95  #: of the true inertia: what the drives reckon with
-    model_weight: float = 0.97  #: of the true weight
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OperatorShape:
-    """The operator's capsule, upright on the tool, [WT] section 3."""
-
-    radius: float = 0.200  #: [m]
-    height: float = 1.80  #: [m] in all
-    offset: tuple[float, ...] = (0.0, 0.0, 0.25)  #: [m] of its middle, in the tool's frame
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GroundTruth:
+class GuardTruth:
     """What holds at one moment."""
 
     tcp_speed: float  #: [m/s]
@@ -64,8 +48,7 @@ class Physics:
         period: float = 0.001,
         payload: float = 0.0,
         brake_scale: float = 1.0,
-        human: OperatorShape | None = None,
-        drives: Drives | None = None,
+        human: HumanKeys | None = None,
     ) -> None:
         """The arm at rest, its brakes closed.
 
@@ -76,7 +59,6 @@ class Physics:
             payload: [kg] more, at the tool's origin.
             brake_scale: of the brakes' torques.
             human: the operator's capsule; left out: the defaults.
-            drives: left out: the defaults.
 
         Raises:
             ConfigError: a link without mass, a joint without brake.
@@ -88,12 +70,11 @@ class Physics:
             raise ConfigError(
                 f"robot {robot.name}: physics needs mass and brake of {', '.join(without)}"
             )
-        self._drives = drives or Drives()
         self._warnings: list[str] = []
         mujoco.set_mju_user_warning(self._warnings.append)
-        human = human or OperatorShape()
+        human = human or HumanKeys()
         self._human_offset = np.array(human.offset)
-        self._model = _compile(robot, period, payload, human.radius, human.height)
+        self._model = _compile(robot, period, payload, human)
         self._data = mujoco.MjData(self._model)
         self._tool = self._model.site(robot.tool.name).id
         self._body = int(self._model.site_bodyid[self._tool])
@@ -101,9 +82,9 @@ class Physics:
         self._timing = robot.brakes
         self._period = period
         self._off_for = np.inf  # [s] since the torque was cut
-        self._wish = np.array(q0, np.float64)  # where the drives want to be
-        self._command = np.zeros_like(self._wish)
-        self._inertia = np.zeros_like(self._wish)
+        self._target = np.array(q0, np.float64)  # where the drives want to be
+        self._command = np.zeros_like(self._target)
+        self._inertia = np.zeros_like(self._target)
         self._data.qpos[:] = q0
         self._close_brakes()
         mujoco.mj_forward(self._model, self._data)
@@ -147,7 +128,7 @@ class Physics:
         twist = self.tool_twist()
         return twist[:3] + np.cross(twist[3:], self.tool_R @ self._human_offset)
 
-    def truth(self, pairs: tuple[str, ...], ends: Sequence[tuple[str, Array]]) -> GroundTruth:
+    def truth(self, pairs: tuple[str, ...], ends: Sequence[tuple[str, Array]]) -> GuardTruth:
         """What the guard should find, by MuJoCo's own kinematics and distances: an oracle.
 
         Args:
@@ -178,7 +159,7 @@ class Physics:
             way[2] += min(max(point[2] - human_W[2], -half), half)
             fastest = max(fastest, float(way @ (jacobian @ data.qvel)) / math.sqrt(way @ way))
         mujoco.mj_jacSite(model, data, jacobian, None, self._tool)
-        return GroundTruth(
+        return GuardTruth(
             tcp_speed=float(np.linalg.norm(jacobian @ data.qvel)), distance=float(distance),
             velocity=fastest,
         )  # fmt: skip
@@ -199,14 +180,14 @@ class Physics:
             if self._off_for > 0.0:  # brakes open, the drives take over where the arm stands
                 self._off_for = 0.0
                 model.dof_frictionloss[:] = 0.0
-                self._wish[:] = data.qpos
+                self._target[:] = data.qpos
                 self._command[:] = 0.0
             self._drive(command)
         else:
             self._off_for += self._period
             data.qfrc_applied[:] = 0.0
             self._close_brakes()
-        data.xfrc_applied[self._body] = 0.0  # nobody pulls, unless
+        data.xfrc_applied[self._body] = 0.0
         if force is not None:
             data.xfrc_applied[self._body, :3] = force[:3]
             arm = data.site_xpos[self._tool] - data.xipos[self._body]
@@ -219,16 +200,16 @@ class Physics:
 
     def _drive(self, command: Array) -> None:
         """Computed torque: a = ramp of the command + 2 w (qd error) + w^2 (q error)."""
-        model, data, drives = self._model, self._data, self._drives
-        self._wish += self._period * command
-        stiffness = drives.frequency**2
+        model, data = self._model, self._data
+        self._target += self._period * command
+        stiffness = _DRIVE_FREQUENCY**2
         wanted = (command - self._command) / self._period
-        wanted += 2.0 * drives.frequency * (command - data.qvel)
-        wanted += stiffness * (self._wish - data.qpos)
+        wanted += 2.0 * _DRIVE_FREQUENCY * (command - data.qvel)
+        wanted += stiffness * (self._target - data.qpos)
         self._command[:] = command
         mujoco.mj_mulM(model, data, self._inertia, wanted)
-        data.qfrc_applied[:] = drives.model_mass * self._inertia
-        data.qfrc_applied += drives.model_weight * data.qfrc_bias
+        data.qfrc_applied[:] = _MODEL_MASS * self._inertia
+        data.qfrc_applied += _MODEL_WEIGHT * data.qfrc_bias
         data.qfrc_applied -= data.qfrc_passive
 
     def _close_brakes(self) -> None:
@@ -247,7 +228,7 @@ def _cross(a: Array, b: Array) -> tuple[float, float, float]:
 
 
 def _compile(
-    robot: CapsuleRobot, period: float, payload: float, human_radius: float, human_height: float
+    robot: CapsuleRobot, period: float, payload: float, operator: HumanKeys
 ) -> mujoco.MjModel:
     spec = mujoco.MjSpec()
     spec.option.timestep = period
@@ -259,7 +240,7 @@ def _compile(
     human = spec.worldbody.add_body(name=_HUMAN, mocap=True)
     human.add_geom(
         name=_HUMAN, type=mujoco.mjtGeom.mjGEOM_CAPSULE, contype=0, conaffinity=0,
-        size=(human_radius, 0.5 * human_height - human_radius, 0.0),
+        size=(operator.radius, 0.5 * operator.height - operator.radius, 0.0),
     )  # fmt: skip
     body = spec.worldbody
     for link in robot.links:

@@ -4,8 +4,6 @@ Every draw belongs to (seed, scan index, sensor, zone), never to the order of ca
 controllers that run the same scene with the same seed meet the same noise.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 
@@ -14,7 +12,8 @@ from numpy.typing import NDArray
 
 from proxcgal import _core
 from proxcgal.core.typing import Array
-from proxcgal.scenario.keys import Sensor, Simulation
+from proxcgal.scenario.simulation_keys import SimulationKeys
+from proxcgal.scenario.skin_keys import SensorKeys
 
 ZONES = 64
 VALID, NO_TARGET, UNCERTAIN = 5, 255, (6, 9)
@@ -24,13 +23,15 @@ _STREAM = 1  # of the seed; faults draw from another
 class RangeModel:
     """The simulated sensors of one skin."""
 
-    def __init__(self, simulation: Simulation, sensor: Sensor, sensors: int, seed: int) -> None:
+    def __init__(
+        self, simulation: SimulationKeys, sensor: SensorKeys, sensors: int, seed: int
+    ) -> None:
         """Args: `sensors` is how many there are; the rest as in the scenario."""
         self._simulation = simulation
         self._sensor = sensor
         self._sensors = sensors
         self._seed = seed
-        self._drawn: dict[int, tuple[Array, Array, Array]] = {}
+        self._index, self._drawn = -1, (np.empty(0),) * 3  # draws of the scan made last
         self._sub_rays = simulation.sub_rays
         rays = _directions(sensor.field_of_view, self._sub_rays)
         length = np.linalg.norm(rays, axis=1)
@@ -81,16 +82,12 @@ class RangeModel:
         return of_rays.reshape(len(of_rays), ZONES, self._sub_rays)
 
     def _draws(self, index: int) -> tuple[Array, Array, Array]:
-        if index not in self._drawn:
+        if index != self._index:  # scans come in order: one index at a time is enough
             generator = np.random.default_rng([self._seed, _STREAM, index])
             shape = (self._sensors, ZONES)
-            self._drawn.clear()  # scans come in order: one index at a time is enough
-            self._drawn[index] = (
-                generator.standard_normal(shape),
-                generator.random(shape),
-                generator.random(shape),
-            )
-        return self._drawn[index]
+            noise, lost = generator.standard_normal(shape), generator.random(shape)
+            self._index, self._drawn = index, (noise, lost, generator.random(shape))
+        return self._drawn
 
 
 def _directions(field_of_view: float, sub_rays: int) -> Array:

@@ -1,6 +1,4 @@
-"""Where a tick's inputs come from: the simulated world, or a recording."""
-
-from __future__ import annotations
+"""Where a tick's inputs come from: simulated sensors on a simulated arm, or a recording."""
 
 from collections.abc import Sequence
 from typing import Protocol
@@ -10,6 +8,7 @@ import numpy as np
 from proxcgal import _core
 from proxcgal.core.typing import Array, Bools
 from proxcgal.scenario.setup import Setup
+from proxcgal.sim.actuation import Actuation
 from proxcgal.sim.mount_faults import RealMounts
 from proxcgal.sim.range_sensor import ZONES, RangeModel
 from proxcgal.sim.tick import TickInput
@@ -20,13 +19,13 @@ _BEFORE = 1 << 20  # index of the scans before the run: their noise is none of t
 
 
 class Source(Protocol):
-    """What the run reads its inputs from, and tells its commands."""
+    """Gives a run its inputs, and takes its commands."""
 
     def read(self) -> TickInput | None:
         """The next tick's inputs; None at the end."""
 
     def command(self, qd: Array) -> None:
-        """What the arm is told for the time until the next tick (n_q,)."""
+        """Velocity until the next tick (n_q,)."""
 
 
 class RecordedSource:
@@ -61,8 +60,7 @@ class SimulatedSource:
         self._period = 1.0 / settings.control_hz
         self._ticks = max(round(setup.scenario.duration * settings.control_hz), 1)
         self._tick = 0
-        self._q = setup.q0.copy()
-        self._qd = np.zeros_like(self._q)
+        self._arm = Actuation(setup.q0, self._period)
         sensors = len(setup.skin)
         self._ranges = RangeModel(settings, setup.scenario.skin.sensor, sensors, seed)
         self._mounting = settings.mounting
@@ -70,37 +68,33 @@ class SimulatedSource:
         turns = np.arange(sensors) / sensors if settings.stagger else np.zeros(sensors)
         self._phase: Array = turns / settings.sensor_hz
         self._scans = np.zeros(sensors, np.int64)
-        links = list(setup.robot.link_names)
-        mounts = setup.skin.mounts
-        self._links = np.array([links.index(mount.link) for mount in mounts], np.intp)
-        self._mounts = RealMounts(mounts, setup.scenario.faults, seed)
+        self._mounts = RealMounts(setup.robot, setup.skin.mounts, setup.scenario.faults, seed)
         #: (sensors, 64) true where the last scan really saw the robot itself.
         self.saw_robot: Bools = np.zeros((sensors, ZONES), bool)
 
     @property
     def q(self) -> Array:
         """(n_q,) where the arm really is."""
-        return self._q
+        return self._arm.q
 
     def standing(self, scans: int) -> list[_core.Scan]:
         """What every sensor would send before the run, the arm at rest where it starts."""
         assert self._world is not None
-        rows = list(range(len(self._links)))
+        rows = list(range(len(self._scans)))
         hits = self._cast(rows, 0.0, self._setup.q0)
-        told = []
+        sent = []
         for index in range(_BEFORE, _BEFORE + scans):
-            ranges, status = self._ranges.measure(rows, index, hits.length)
-            told += [_core.Scan(row, index, 0.0, ranges[row], status[row]) for row in rows]
-        return told
+            sent += self._scans_of(rows, index, 0.0, hits)
+        return sent
 
     def read(self) -> TickInput | None:
         """Moves the arm by the last command and collects the scans made on the way."""
         if self._tick == self._ticks:
             return None
         time = self._tick * self._period
-        before, start = self._q, time - self._period
+        start = time - self._period
         if self._tick > 0:
-            self._q = before + self._qd * self._period
+            self._arm.step()
         scans: list[_core.Scan] = []
         while self._world is not None:
             stamps = self._scans / self._scan_hz + self._phase
@@ -108,24 +102,27 @@ class SimulatedSource:
             if stamp > time:
                 break
             rows = [int(row) for row in np.flatnonzero(stamps == stamp)]
-            scans += self._measure(rows, stamp, before + self._qd * (stamp - start))
+            scans += self._measure(rows, stamp, self._arm.within_step(stamp - start))
         self._tick += 1
-        tool_W = np.asarray(self._setup.robot.tool_pose(self._q))[:3, 3]
+        tool_W = np.asarray(self._setup.robot.tool_pose(self.q))[:3, 3]
         goal = self._waypoints.at(time, tool_W)
-        return TickInput(time, self._q, goal, tuple(scans), self._world is None)
+        return TickInput(time, self.q, goal, tuple(scans), self._world is None)
 
     def command(self, qd: Array) -> None:
         """Velocity until the next tick (n_q,)."""
-        self._qd = qd
+        self._arm.qd = qd
 
     def _measure(self, rows: list[int], stamp: float, q: Array) -> list[_core.Scan]:
         """Scans of the sensors that measure together; they share one index."""
         assert self._world is not None
         hits = self._cast(rows, stamp, q)
-        index = int(self._scans[rows[0]])
-        ranges, status = self._ranges.measure(rows, index, hits.length)
+        scans = self._scans_of(rows, int(self._scans[rows[0]]), stamp, hits)
         self.saw_robot[rows] = self._ranges.pick(hits.length, hits.robot)
         self._scans[rows] += 1
+        return scans
+
+    def _scans_of(self, rows: list[int], index: int, stamp: float, hits: Hits) -> list[_core.Scan]:
+        ranges, status = self._ranges.measure(rows, index, hits.length)
         return [
             _core.Scan(row, index, stamp, ranges[at], status[at]) for at, row in enumerate(rows)
         ]
@@ -134,6 +131,6 @@ class SimulatedSource:
         """What the rays of some sensors meet, from where these really are."""
         assert self._world is not None
         self._world.place(q, time)
-        T_WS = self._setup.robot.link_poses(q)[self._links[rows]] @ self._mounts.at(time)[rows]
+        T_WS = self._mounts.poses_W(q, time, rows)
         directions_W = self._ranges.rays_S @ np.swapaxes(T_WS[:, :3, :3], 1, 2)
         return self._world.cast(T_WS[:, :3, 3], directions_W, self._mounting)

@@ -1,7 +1,5 @@
 """What all sensors see of a scene, from a robot that stands still."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
@@ -9,12 +7,11 @@ import numpy as np
 
 from proxcgal import _core
 from proxcgal.core.typing import Array, Bools
-from proxcgal.scenario.loading import Scenario
+from proxcgal.scenario.scenario import Scenario
 from proxcgal.scenario.setup import Setup
+from proxcgal.sim.assembly import Assembly
 from proxcgal.sim.range_sensor import ZONES
-from proxcgal.sim.source import SimulatedSource
 from proxcgal.sim.tick import TickInput
-from proxcgal.sim.world import World
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,10 +28,10 @@ class StaticScan:
     def within(self, reach: float) -> Self:
         """The same without the points whose ray is longer than that [m]."""
         near = np.linalg.norm(self.points_W - self.origins_W, axis=1) <= reach
-        return replace(
-            self, origins_W=self.origins_W[near], points_W=self.points_W[near],
-            tolerance=self.tolerance[near], environment=self.environment[near],
-        )  # fmt: skip
+        return replace(self, **{name: getattr(self, name)[near] for name in _BY_POINT})
+
+
+_BY_POINT = ("origins_W", "points_W", "tolerance", "environment")
 
 
 def scan_static(scenario: Scenario, scans: int = 1) -> StaticScan:
@@ -56,23 +53,19 @@ def scan_static(scenario: Scenario, scans: int = 1) -> StaticScan:
     changed: dict[str, Any] = {
         "simulation": simulation, "duration": long_enough, "faults": (),
     }  # fmt: skip
-    setup = Setup.of(scenario.model_copy(update=changed))
-    source = SimulatedSource(setup, World(setup.robot, setup.scene), scenario.seed)
-    ctrl = setup.make_controller("wb")
+    run = Assembly.of(Setup.of(scenario.model_copy(update=changed)), "wb")
+    ctrl = run.ctrl
     taken: list[StaticScan] = []
-    while len(taken) < scans and (inputs := source.read()) is not None:
+    while len(taken) < scans and (inputs := run.source.read()) is not None:
         ctrl.tick(inputs.time, inputs.q, list(inputs.scans), inputs.goal)
         if inputs.scans:
-            kept = np.zeros((len(setup.skin), ZONES), bool)
+            kept = np.zeros((len(run.setup.skin), ZONES), bool)
             kept[tuple(np.asarray(ctrl.cloud_origins()).T)] = True
-            taken.append(_placed(setup, inputs, kept))
+            taken.append(_placed(run.setup, inputs, kept))
     return StaticScan(
-        setup=setup,
+        setup=run.setup,
         scans=tuple(scan for part in taken for scan in part.scans),
-        origins_W=np.concatenate([part.origins_W for part in taken]),
-        points_W=np.concatenate([part.points_W for part in taken]),
-        tolerance=np.concatenate([part.tolerance for part in taken]),
-        environment=np.concatenate([part.environment for part in taken]),
+        **{name: np.concatenate([getattr(part, name) for part in taken]) for name in _BY_POINT},
     )
 
 

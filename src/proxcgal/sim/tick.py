@@ -130,7 +130,7 @@ class TickTruth:
     leaked: int = 0  #: points of the filtered cloud that really are the robot itself
 
 
-#: Of a robot outside the simulator: nobody knows.
+#: Of a real robot.
 UNKNOWN = TickTruth(distance=np.nan, own=np.nan)
 
 

@@ -1,7 +1,5 @@
 """Where the tool is sent, tick by tick: one goal, or way points back and forth."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
@@ -17,8 +15,8 @@ class Waypoints:
 
         Args:
             goals: (4, 4) T_WT each, at least one.
-            arrival: so near to a goal's position the next one is due [m].
-            patience: so long after a goal was due the next one is [s].
+            arrival: distance to a goal's position at which the next one is due [m].
+            patience: time after which the next goal is due in any case [s].
         """
         there = list(range(len(goals)))
         self._goals = goals

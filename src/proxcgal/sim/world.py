@@ -3,32 +3,47 @@
 MuJoCo casts the rays at the scene; at the robot's own links, with their tens of thousands of faces,
 our trees cast them four times faster, with the same hits (tested).
 
-The only module that knows MuJoCo. Nothing is stepped: the arm follows its velocity commands
-exactly and the scene its paths, so poses are set, and rays and pictures are taken at them.
+Beside `physics` the only module that imports MuJoCo. Nothing is stepped: the arm follows its
+velocity commands exactly and the scene its paths, so poses are set, and rays and pictures are taken
+at them.
 """
 
-from __future__ import annotations
-
 import copy
+import ctypes
 import os
+import sys
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from weakref import WeakKeyDictionary
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from proxcgal.core.errors import SimulationError
 from proxcgal.core.typing import Array, Bools
+from proxcgal.models.robots import Robot
 from proxcgal.models.surfaces import Surfaces
-from proxcgal.scene.solids import Box, Capsule, Cylinder, Solid, Sphere
-from proxcgal.sim import MUJOCO_CAME_FIRST
+from proxcgal.scene.obstacles import Scene
+from proxcgal.scene.solids import Box, CapsuleSolid, Cylinder, Solid, Sphere
 
-if TYPE_CHECKING:
-    from proxcgal.models.robots import Robot
-    from proxcgal.scene.obstacles import Scene
+
+def _off_screen_library() -> str:
+    """What to draw with where there is no display; "disable" where nothing can."""
+    for backend, library in (("egl", "libEGL.so.1"), ("osmesa", "libOSMesa.so.8")):
+        try:
+            ctypes.CDLL(library)
+        except OSError:
+            continue
+        return backend
+    return "disable"
+
+
+if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("MUJOCO_GL")):
+    os.environ["MUJOCO_GL"] = _off_screen_library()  # read once, by the import
+
+_TOO_LATE = "mujoco" in sys.modules
+import mujoco  # noqa: E402
 
 Color = tuple[float, float, float, float]
 
@@ -38,7 +53,7 @@ _CAST_GROUP = np.array([1, 0, 0, 0, 0, 0], np.uint8)
 _GEOMS: dict[type[Solid], Any] = {
     Box: mujoco.mjtGeom.mjGEOM_BOX,
     Cylinder: mujoco.mjtGeom.mjGEOM_CYLINDER,
-    Capsule: mujoco.mjtGeom.mjGEOM_CAPSULE,
+    CapsuleSolid: mujoco.mjtGeom.mjGEOM_CAPSULE,
     Sphere: mujoco.mjtGeom.mjGEOM_SPHERE,
 }
 _LINK_COLORS = ((0.83, 0.84, 0.86, 1.0), (0.45, 0.62, 0.76, 1.0))
@@ -226,8 +241,8 @@ class World:
         if any(numbers) and not self._warnings:
             self._warnings.append(f"warning counters {numbers}")
         if self._warnings:
-            told, self._warnings[:] = "; ".join(self._warnings), []
-            raise SimulationError(f"MuJoCo warned: {told}")
+            found, self._warnings[:] = "; ".join(self._warnings), []
+            raise SimulationError(f"MuJoCo warned: {found}")
 
     def _shape(self, solids: Sequence[Solid]) -> None:
         """Gives the compiled solids their sizes, and all that MuJoCo derives of them."""
@@ -255,7 +270,7 @@ class World:
                 self._renderers[size] = mujoco.Renderer(self._model, size[1], size[0])
             except Exception as error:  # each GL backend fails in its own way
                 cure = "install libegl1 and libgl1-mesa-dri, or libosmesa6"
-                if MUJOCO_CAME_FIRST:
+                if _TOO_LATE:
                     cure = "mujoco was imported before proxcgal.sim: import that first"
                 backend = os.environ.get("MUJOCO_GL")
                 raise SimulationError(

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from proxcgal.core.errors import ConfigError
-from proxcgal.scenario.loading import Scenario
+from proxcgal.core.progress import OnProgress
+from proxcgal.scenario.scenario import Scenario
 from proxcgal.study.campaign_store import Outcome, Row, Value
-from proxcgal.study.jobs import ShareReport
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,7 +54,7 @@ def file_name(name: str) -> str:
     return re.sub(r"[^\w.-]|^\.", "_", name)
 
 
-Perform = Callable[[Trial, ShareReport], Row]
+Perform = Callable[[Trial, OnProgress], Row]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

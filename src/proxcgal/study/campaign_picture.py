@@ -9,10 +9,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from proxcgal.core.errors import ProxError
-from proxcgal.core.progress import Progress
+from proxcgal.core.progress import OnProgress, ProgressBar
 from proxcgal.recording.reader import read_recording
 from proxcgal.study.campaign import Trial
-from proxcgal.study.jobs import ShareReport
 from proxcgal.study.motion_picture import DRAWING, MOVING, motion_picture
 from proxcgal.study.trial_simulation import simulate_trial
 from proxcgal.study.workers import Pool
@@ -33,14 +32,14 @@ def draw_moving(trials: Sequence[Trial], folder: Path, pool: Pool, *, quiet: boo
         shutil.rmtree(half, ignore_errors=True)
     if not trials or (folder / MOVING).is_file():
         return
-    with Progress("drawing", [1.0], "", quiet=quiet) as progress:
+    with ProgressBar("drawing", [1.0], "", quiet=quiet) as progress:
         pool.run(
             [functools.partial(_draw, list(trials), folder)],
             progress.shares, lambda _, text: progress.finished(text), lambda *_: "no picture",
         )  # fmt: skip
 
 
-def _draw(trials: Sequence[Trial], folder: Path, report: ShareReport) -> str:
+def _draw(trials: Sequence[Trial], folder: Path, report: OnProgress) -> str:
     steps = len(trials) + 1
     with tempfile.TemporaryDirectory(prefix=DRAWING, dir=folder) as half:
         try:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from proxcgal.core.errors import ConfigError
-from proxcgal.models import Robot
-from proxcgal.scenario.loading import Scenario
+from proxcgal.models.robots import Robot
+from proxcgal.scenario.scenario import Scenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.study.campaign import Campaign, Perform, Trial, file_name
 from proxcgal.study.campaign_kind import CampaignRequest

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from proxcgal.core.progress import Progress, announce
-from proxcgal.core.provenance import origin
-from proxcgal.core.versions import versions
-from proxcgal.evaluation.metrics import Summary, write_bytes, write_json, write_text
+from proxcgal.core.files import write_bytes, write_json, write_text
+from proxcgal.core.progress import ProgressBar, announce
+from proxcgal.core.provenance import origin, versions
+from proxcgal.evaluation.metrics import Summary
 from proxcgal.recording.writer import RecordedTicks
 from proxcgal.study.campaign import Campaign, Ended, Trial
 from proxcgal.study.campaign_kind import CampaignKind, CampaignRequest
@@ -124,7 +124,7 @@ def _perform(
     if ended:
         announce(f"{ended} of {count} trials are there already", quiet=quiet)
     sizes = [trial.scenario.duration for trial in todo]
-    with Progress("simulating", sizes, "s", quiet=quiet) as progress:
+    with ProgressBar("simulating", sizes, "s", quiet=quiet) as progress:
 
         def done(trial: Trial, outcome: Outcome) -> None:
             nonlocal ended

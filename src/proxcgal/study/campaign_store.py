@@ -13,7 +13,7 @@ from typing import Any
 
 from proxcgal.core.closing import Closing
 from proxcgal.core.errors import ConfigError
-from proxcgal.evaluation.metrics import write_json
+from proxcgal.core.files import write_json
 
 MANIFEST, TRIALS, SUMMARY = "campaign.json", "trials", "summary.json"
 

@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import Any
 
 from proxcgal.core.errors import ConfigError
-from proxcgal.core.versions import versions
+from proxcgal.core.provenance import versions
 
 CONNECT_S = 10.0  # [s] in which a scheduler has to answer
 

@@ -8,9 +8,10 @@ import traceback
 from collections.abc import Callable
 
 from proxcgal.core.errors import ConfigError, ProxError
+from proxcgal.core.progress import OnProgress
 from proxcgal.study.campaign import Campaign, Ended, Perform, Trial
 from proxcgal.study.campaign_store import CampaignStore, Outcome
-from proxcgal.study.jobs import ShareReport, StoppedError
+from proxcgal.study.jobs import StoppedError
 from proxcgal.study.workers import Pool
 
 
@@ -73,7 +74,7 @@ def perform_trials(
     return [Ended(trial=trial, outcome=outcomes[trial.key]) for trial in campaign.trials]
 
 
-def _attempt(perform: Perform, trial: Trial, report: ShareReport) -> Outcome:
+def _attempt(perform: Perform, trial: Trial, report: OnProgress) -> Outcome:
     """One trial, in whichever process; what goes wrong becomes part of the outcome."""
     begin = clock.perf_counter()
     try:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from proxcgal.evaluation.metrics import aligned
+from proxcgal.core.tables import aligned
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

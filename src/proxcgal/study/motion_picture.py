@@ -14,7 +14,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from proxcgal.recording.reader import Recording
 from proxcgal.recording.render import RecordedMoment, draw, recorded_moments, write_gif
-from proxcgal.scenario.loading import HriScenario
+from proxcgal.scenario.hri_scenario import HriScenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.scene.solids import Box
 from proxcgal.sim.world import Camera, World

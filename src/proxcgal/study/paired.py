@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import polars as pl
 
+from proxcgal.core.files import NOTHING_M
 from proxcgal.core.typing import Array
-from proxcgal.evaluation.metrics import NOTHING_M
 
 Distances = Mapping[str, Mapping[int, float]]  # [m] by controller, then by draw or subject
 

@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from proxcgal.core.errors import ConfigError, ModelWarning
-from proxcgal.models import Robot
+from proxcgal.core.progress import OnProgress
+from proxcgal.evaluation.trial_log import TrialLog
+from proxcgal.models.robots import Robot
 from proxcgal.recording.writer import RecordedTicks, Recorder
-from proxcgal.scenario.loading import Scenario
+from proxcgal.scenario.scenario import Scenario
 from proxcgal.scenario.setup import make_robot
-from proxcgal.study.jobs import ShareReport
-from proxcgal.trial.trial import TrialLog, run_trial
+from proxcgal.trial.trial import run_trial
 
 _KEPT = 4  # robots, with all that is made of them once
 _robots: dict[Any, Robot] = {}
@@ -24,7 +25,7 @@ def simulate_trial(
     scenario: Scenario,
     controller: str,
     seed: int,
-    report: ShareReport,
+    report: OnProgress,
     *,
     recording: Path | None = None,
     ticks: RecordedTicks = "all",

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from proxcgal.core.errors import RecordingError
-from proxcgal.core.progress import Progress
-from proxcgal.core.versions import versions
+from proxcgal.core.progress import OnProgress, ProgressBar
+from proxcgal.core.provenance import versions
 from proxcgal.recording.reader import read_recording
 from proxcgal.recording.writer import RecordedTicks
 from proxcgal.study.campaign import Ended, Trial
 from proxcgal.study.execution import failure_text
-from proxcgal.study.jobs import ShareReport, StoppedError
+from proxcgal.study.jobs import StoppedError
 from proxcgal.study.trial_simulation import simulate_trial
 from proxcgal.study.workers import Pool
 
@@ -46,7 +46,7 @@ def record_worst(
     todo = {n: e for n, e in files.items() if not _there(place / n, e.trial, ticks)}
     jobs = [functools.partial(_record, e.trial, place / name, ticks) for name, e in todo.items()]
     sizes = [each.trial.scenario.duration for each in todo.values()]
-    with Progress("recording the worst", sizes, "s", quiet=quiet) as progress:
+    with ProgressBar("recording the worst", sizes, "s", quiet=quiet) as progress:
         answers = pool.run(jobs, progress.shares, on_lost=_lost)
     errors: dict[str, str] = {}
     for (name, each), answer in zip(todo.items(), answers, strict=True):
@@ -92,7 +92,7 @@ def _lost(_: int, deaths: int) -> str:
 
 
 def _record(
-    trial: Trial, path: Path, ticks: RecordedTicks, report: ShareReport
+    trial: Trial, path: Path, ticks: RecordedTicks, report: OnProgress
 ) -> dict[str, Any] | str:
     """Records one trial, in whichever process; the file is whole, or there is none.
 

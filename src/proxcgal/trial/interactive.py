@@ -1,9 +1,7 @@
-"""A trial that goes on for as long as somebody watches: solids moved by hand, sensors silenced.
+"""A trial without end, driven by a page: solids moved by hand, sensors silenced.
 
 The same way through as every trial: source -> injected faults -> tick.
 """
-
-from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -14,25 +12,22 @@ import numpy as np
 from proxcgal.core.modes import STOP
 from proxcgal.core.typing import Array
 from proxcgal.evaluation.ground_truth import GroundTruth
-from proxcgal.models import Robot
-from proxcgal.scenario.loading import Scenario
+from proxcgal.models.robots import Robot
+from proxcgal.scenario.scenario import Scenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.scene.dragging import DraggedSolids, LiveScene
-from proxcgal.sim.faults import FaultInjector
-from proxcgal.sim.loop import run_ticks
+from proxcgal.sim.clouds import Clouds
 from proxcgal.sim.moment import Moment
-from proxcgal.sim.mount_faults import require_mounts
-from proxcgal.sim.source import SimulatedSource
 from proxcgal.sim.tick import TickInput, TickResult
-from proxcgal.sim.world import World
-from proxcgal.trial.walkthrough.grip import HAND
-from proxcgal.trial.walkthrough.guided import GuidedScenario, GuidedSource
+from proxcgal.trial.assembly import assemble
+from proxcgal.trial.walkthrough.guided_source import GuidedSource
+from proxcgal.trial.walkthrough.interactive_hand import HAND
 
 _ENDLESS = 1e7  # [s]
 
 
 class LiveTrial:
-    """A scenario that has no end and takes what somebody does to it, between two ticks."""
+    """A scenario without end that takes a user's changes between two ticks."""
 
     def __init__(
         self,
@@ -74,20 +69,15 @@ class LiveTrial:
             drawn=drawn,
             q0=setup.q0 if q is None else np.array(q),
         )
-        known = setup.known_cloud() if setup.uses_known_points(controller) else None
-        self.ctrl = setup.make_controller(controller, 0 if known is None else len(known))
-        names = [mount.name for mount in setup.skin.mounts]
-        self._faults = FaultInjector(scenario.faults, names, scenario.seed)
-        world = World(setup.robot, scene) if known is None else None
-        make = GuidedSource if isinstance(scenario, GuidedScenario) else SimulatedSource
-        self._source = source = make(setup, world, scenario.seed)
-        if world is not None and scenario.skin.check_mounts and q is None:
-            require_mounts(setup, source)
-        if isinstance(source, GuidedSource) and q is not None:
-            source.take_over()  # its path began elsewhere
+        self._run = run = assemble(setup, controller)
+        self.ctrl, self._source = run.ctrl, run.source
+        if q is None:
+            run.require_mounts()
+        elif isinstance(run.source, GuidedSource):
+            run.source.take_over()  # its path began elsewhere
         self._truth = GroundTruth(setup.robot, measured)
         self._count = 0
-        self._ticks = run_ticks(source, self.ctrl, self._spoiled, known)
+        self._ticks = run.ticks(self._spoiled)
         self._last: tuple[TickInput, TickResult] | None = None
 
     @property
@@ -107,7 +97,7 @@ class LiveTrial:
 
     @property
     def stopped(self) -> bool:
-        """Is the controller in STOP? Nothing that the trial is told leads out of it."""
+        """Is the controller in STOP? No request of a user leads out of it."""
         return self._last is not None and self._last[1].mode == STOP
 
     @property
@@ -130,7 +120,7 @@ class LiveTrial:
     def move(self, name: str, wanted: Array) -> None:
         """Has a hand take a solid to a pose (4, 4) T_WO; unknown names are passed over.
 
-        `HAND`, of a guided arm, is the hand at the tool: it no longer goes its own way then.
+        `HAND`, of a guided arm, is the hand at the tool: from then on a user moves it.
         """
         if name == HAND and isinstance(self._source, GuidedSource):
             self._source.take_over().move(self._tool(), wanted)
@@ -142,8 +132,8 @@ class LiveTrial:
     def release(self) -> None:
         """Lets go of all that is held."""
         self.hands.release()
-        if isinstance(self._source, GuidedSource) and self._source.grip is not None:
-            self._source.grip.let_go()
+        if isinstance(self._source, GuidedSource) and self._source.user_hand is not None:
+            self._source.user_hand.let_go()
 
     def moment(self) -> Moment:
         """What there is to see now, the true distance with it."""
@@ -152,17 +142,18 @@ class LiveTrial:
         now = (self._count - 1) * self.period
         true = self._truth.nearest(self._source.q, now).distance
         q = inputs.q if np.isfinite(inputs.q).all() else self._source.q
+        held = np.isin(self.ctrl.cloud_origins()[:, 0], list(self.off))
         return Moment.of(
-            self.setup, inputs, result, self.ctrl, now, q=q, true=true,
-            since=self.since, off=self.off, **self._hand(),
+            self.setup, inputs, result, Clouds.of(self.ctrl), now, q=q, true=true,
+            since=self.since, held=held, **self._hand(),
         )  # fmt: skip
 
     def _hand(self) -> dict[str, Any]:
-        """The hand at the tool of a guided arm: where it is, and whether somebody holds it."""
+        """The hand at the tool of a guided arm: where it is, and whether a user holds it."""
         if not isinstance(self._source, GuidedSource):
             return {}
-        grip = self._source.grip
-        pose = None if grip is None else grip.pose
+        hand = self._source.user_hand
+        pose = None if hand is None else hand.pose
         return {"hand_W": self._tool() if pose is None else pose, "gripped": pose is not None}
 
     def _tool(self) -> Array:
@@ -170,7 +161,7 @@ class LiveTrial:
 
     def _spoiled(self, inputs: TickInput) -> TickInput:
         """What the controller gets: the scenario's faults, and nothing of silent sensors."""
-        inputs = self._faults(inputs)
+        inputs = self._run.faults(inputs)
         if not self.off:
             return inputs
         return replace(inputs, scans=tuple(s for s in inputs.scans if s.sensor not in self.off))

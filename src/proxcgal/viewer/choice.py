@@ -5,13 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from proxcgal.core.errors import ConfigError
-from proxcgal.scenario.loading import (
-    CONTROLLERS,
-    Scenario,
-    change_scenario,
-    list_scenarios,
-    load_scenario,
-)
+from proxcgal.scenario.loading import change_scenario, list_scenarios, load_scenario
+from proxcgal.scenario.scenario import CONTROLLERS, Scenario
 
 #: Vertices a link of the controller's meshes.
 RESOLUTIONS = (100, 300, 1000, 3000, 10000)

@@ -9,7 +9,7 @@ from typing import Any
 import viser
 
 from proxcgal.core import modes
-from proxcgal.scenario.loading import CONTROLLERS, Scenario
+from proxcgal.scenario.scenario import CONTROLLERS, Scenario
 from proxcgal.sim.moment import Moment, metres
 from proxcgal.viewer.access import AccessControl
 from proxcgal.viewer.choice import (

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from proxcgal.core.transforms import placed
 from proxcgal.core.typing import Array
-from proxcgal.scene.solids import Box, Capsule, Cylinder, Solid, Sphere
+from proxcgal.scene.solids import Box, CapsuleSolid, Cylinder, Solid, Sphere
 from proxcgal.sim.moment import Posed
 from proxcgal.viewer.scene_model import SceneModel
 
@@ -260,7 +260,7 @@ def _solid(scene: viser.SceneApi, name: str, solid: Solid, color: Color) -> Any:
         return scene.add_cylinder(name, radius=solid.radius, height=solid.height, **plain)
     if isinstance(solid, Sphere):
         return scene.add_icosphere(name, radius=solid.radius, **plain)
-    assert isinstance(solid, Capsule)
+    assert isinstance(solid, CapsuleSolid)
     shape = trimesh.creation.capsule(height=solid.length, radius=solid.radius, count=(16, 16))
     shape.apply_translation(-shape.bounds.mean(axis=0))
     return scene.add_mesh_simple(name, np.asarray(shape.vertices), np.asarray(shape.faces), **plain)

@@ -11,7 +11,7 @@ from multiprocessing.connection import Connection
 import viser
 
 from proxcgal.core.errors import SimulationError
-from proxcgal.scenario.loading import Scenario
+from proxcgal.scenario.scenario import Scenario
 from proxcgal.viewer.access import AccessControl
 from proxcgal.viewer.command_queue import CommandQueue
 from proxcgal.viewer.controller_panel import ControllerPanel

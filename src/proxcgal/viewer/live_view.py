@@ -6,7 +6,7 @@ import os
 import sys
 import threading
 
-from proxcgal.scenario.loading import Scenario
+from proxcgal.scenario.scenario import Scenario
 from proxcgal.study.runs.setup_check import check_setup
 from proxcgal.trial.walkthrough.setup import WalkSetup
 from proxcgal.viewer.live_page import LivePage
@@ -31,7 +31,7 @@ def view_scenario(
             simulation that failed.
     """
     if is_walk(scenario):
-        print("\n".join(WalkSetup.of(scenario).told()))
+        print("\n".join(WalkSetup.of(scenario).notes()))
     else:
         check_setup(scenario, [controller])
     label = f"proxcgal: {scenario.name}"

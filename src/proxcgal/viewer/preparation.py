@@ -8,7 +8,7 @@ from multiprocessing.process import BaseProcess
 
 from proxcgal.core.errors import ProxError
 from proxcgal.models.mesh.display import display_meshes
-from proxcgal.scenario.loading import Scenario
+from proxcgal.scenario.scenario import Scenario
 from proxcgal.scenario.setup import make_robot
 from proxcgal.viewer.choice import Choice
 

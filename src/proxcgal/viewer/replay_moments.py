@@ -11,6 +11,7 @@ from proxcgal.core.typing import Array
 from proxcgal.recording.reader import Recording
 from proxcgal.recording.replay import Replay
 from proxcgal.scenario.setup import Setup
+from proxcgal.sim.clouds import Clouds
 from proxcgal.sim.moment import Moment
 from proxcgal.sim.tick import Tick
 from proxcgal.viewer.scene_model import SceneModel
@@ -25,8 +26,9 @@ class ReplayedRun:
     model: SceneModel
     controller: str
     moments: tuple[Moment, ...]
-    same: int | None  #: ticks whose answers are the recorded ones bit for bit; None: not asked
+    same: int | None  #: ticks whose answers are the recorded ones bit for bit; None: as recorded
     ticks: int  #: of the recording
+    clouds: bool = True  #: are they known?
 
 
 def replay_moments(
@@ -37,10 +39,10 @@ def replay_moments(
     *,
     ahead: bool = False,
 ) -> ReplayedRun:
-    """Computes a recording again, which gives its clouds too.
+    """The run as recorded; computed again for other settings, or where its clouds are missing.
 
     Args:
-        recording: of a run; one that holds scan ticks only is shown as recorded, without clouds.
+        recording: of a run; an older one that holds scan ticks only is shown without clouds.
         hz: moments a second, at most one a tick.
         controller: instead of the recorded one.
         overrides: `key.sub=value` on the recorded scenario.
@@ -50,36 +52,36 @@ def replay_moments(
         ConfigError: a bad override; what the recording does not hold.
     """
     settings, times = recording.settings, recording.elapsed()
-    if settings.ticks != "all" and controller is None and not overrides:
+    last, count = len(recording.ticks) - 1, len(recording.ticks)
+    step = max(round(settings.scenario.simulation.control_hz / hz), 1)
+    whole = settings.ticks == "all"
+    if controller is None and not overrides and (recording.has_clouds or not whole):
         setup = Setup.of(settings.scenario)
-        rows = range(len(recording.ticks))
         moments = [
-            _moment(setup, None, tick, q, float(time))
-            for tick, q, time in zip(recording.ticks, recording.postures(), times, strict=True)
+            _moment(setup, recording.clouds(row), tick, q, float(times[row]))
+            for row, (tick, q) in enumerate(zip(recording.ticks, recording.postures(), strict=True))
+            if not whole or row % step == 0 or row == last
         ]
         return ReplayedRun(
-            SceneModel.of(setup), settings.controller, tuple(moments), None, len(rows)
-        )
+            SceneModel.of(setup), settings.controller, tuple(moments), None, count,
+            recording.has_clouds,
+        )  # fmt: skip
     again = Replay(recording, controller, overrides)
-    period = again.ctrl.config.period
-    step = max(round(1.0 / (hz * period)), 1)
-    last = len(recording.ticks) - 1
     moments, same = [], 0
     both = zip(recording.ticks, again, recording.postures(), strict=True)
     for row, (then, now, q) in enumerate(both):
         same += now.result.same(then.result)
         if row % step == 0 or row == last:
-            moments.append(_moment(again.setup, again, now, q, float(times[row])))
+            clouds = Clouds.of(again.ctrl)
+            moments.append(_moment(again.setup, clouds, now, q, float(times[row])))
     if ahead:
         moments = [_ahead(again.setup, moment) for moment in moments]
-    return ReplayedRun(
-        SceneModel.of(again.setup), again.controller, tuple(moments), same, len(recording.ticks)
-    )
+    return ReplayedRun(SceneModel.of(again.setup), again.controller, tuple(moments), same, count)
 
 
-def _moment(setup: Setup, again: Replay | None, tick: Tick, q: Array, elapsed: float) -> Moment:
-    ctrl = None if again is None else again.ctrl
-    return Moment.of(setup, tick.inputs, tick.result, ctrl, elapsed, q=q, true=tick.truth.distance)
+def _moment(setup: Setup, clouds: Clouds | None, tick: Tick, q: Array, elapsed: float) -> Moment:
+    true = tick.truth.distance
+    return Moment.of(setup, tick.inputs, tick.result, clouds, elapsed, q=q, true=true)
 
 
 def _ahead(setup: Setup, moment: Moment) -> Moment:

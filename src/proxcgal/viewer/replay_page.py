@@ -201,9 +201,10 @@ def view_recording(
 
 
 def comparison_text(recorded: ReplayedRun, again: ReplayedRun | None) -> str:
-    """Whether the recording is repeated bit for bit, and the differences of what is beside it."""
+    """Whether it is shown as recorded or computed again, and what was computed beside it."""
     if recorded.same is None:
-        text = "holds ticks with scans only: shown as recorded, without clouds"
+        text = f"{recorded.ticks} ticks, shown as recorded"
+        text += "" if recorded.clouds else ", without clouds"
     elif recorded.same == recorded.ticks:
         text = (
             f"recomputed with its own settings: all {recorded.ticks} answers are those recorded, "

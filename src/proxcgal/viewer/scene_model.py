@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxcgal.core.typing import Array
-from proxcgal.models import Robot
 from proxcgal.models.mesh.display import display_meshes
+from proxcgal.models.robots import Robot
 from proxcgal.scenario.setup import Setup
-from proxcgal.scene.solids import Capsule, Solid
-from proxcgal.trial.walkthrough.grip import HAND
+from proxcgal.scene.solids import CapsuleSolid, Solid
 from proxcgal.trial.walkthrough.interactive import WalkTrial
+from proxcgal.trial.walkthrough.interactive_hand import HAND
 
 OPERATOR = "operator"  #: the capsule that rides on the tool
 
@@ -84,7 +84,7 @@ class SceneModel:
             names=(OPERATOR,),
             sensed=(OPERATOR,),
             draggable=(HAND,),
-            solids=(Capsule(human.radius, human.height - 2.0 * human.radius),),
+            solids=(CapsuleSolid(human.radius, human.height - 2.0 * human.radius),),
             solids_W=trial.operator_W()[None],
             tool_W=np.asarray(setup.robot.tool_pose(setup.q0))[:3, 3],
         )

@@ -17,8 +17,8 @@ from typing import TypeGuard
 import numpy as np
 
 from proxcgal.core.errors import ModelWarning, ProxError
-from proxcgal.scenario.loading import Scenario
-from proxcgal.scenario.walkthrough import WalkScenario
+from proxcgal.scenario.scenario import Scenario
+from proxcgal.scenario.walkthrough_scenario import WalkScenario
 from proxcgal.trial.interactive import LiveTrial
 from proxcgal.trial.walkthrough.interactive import WalkTrial
 from proxcgal.viewer.choice import Choice

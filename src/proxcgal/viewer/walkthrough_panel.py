@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import viser
 
-from proxcgal.scenario.walkthrough import Guard, WalkScenario
+from proxcgal.scenario.walkthrough_keys import GuardKeys
+from proxcgal.scenario.walkthrough_scenario import WalkScenario
 from proxcgal.sim.moment import Posed
 from proxcgal.trial.walkthrough.interactive import WalkMoment
 from proxcgal.viewer.access import AccessControl
@@ -72,7 +73,7 @@ class WalkPanel(Panel):
 class WalkPlots:
     """What the guard watches, over the last 10 s, with its bounds."""
 
-    def __init__(self, gui: viser.GuiApi, keys: Guard) -> None:
+    def __init__(self, gui: viser.GuiApi, keys: GuardKeys) -> None:
         """Adds three plots."""
         self._rows = RecentRows()
         self._keys = keys

@@ -8,6 +8,24 @@ namespace proxcgal {
 /// queries, kept as oracle and as the baseline of every timing.
 enum class Method : std::uint8_t { kFast, kPaper };
 
+/// When a point that passed the filter is believed.
+enum class Confirmation : std::uint8_t {
+  kOff,
+  kZones,  ///< a neighbouring zone of the same scan sees a similar range
+  kScans,  ///< the zone saw a similar range in one of the last two scans as well
+};
+
+/// How the robot's own body is told from obstacles: Algorithm 1 of [WA], and what noise adds.
+struct FilterConfig {
+  double tolerance = 0.02;     ///< [m] epsilon of Algorithm 1
+  double sigmas = 4.0;         ///< the tolerance is at least this many sigma(range)
+  double min_hit = 0.005;      ///< [m] nearer hits are the sensor's own mounting
+  bool surface_margin = true;  ///< also drop what lies that near to any link's surface
+  Confirmation confirmation = Confirmation::kOff;
+  double z_min = -kInfinity;  ///< [m] world height below which points are cropped (floor)
+  void validate() const;
+};
+
 /// Algorithm 1 of [WA]: clears `keep` where any link's first hit along a point's ray explains it.
 ///
 /// @param origins_W  ray origins, (n, 3): the emitters

@@ -1,7 +1,5 @@
 """Robots given as a list of capsules in a TOML file: links, joints, and what physics needs."""
 
-from __future__ import annotations
-
 import math
 import tomllib
 from functools import cached_property
@@ -13,15 +11,13 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from proxcgal._core import Capsule, LinkCapsule
 from proxcgal.core.errors import ModelError
+from proxcgal.core.schema import NonNegative, Positive, Vector
+from proxcgal.core.transforms import pose
 from proxcgal.core.typing import Array
-from proxcgal.models.capsules import capsule_mesh
 from proxcgal.models.description import Frame, Joint, Link, RobotDescription
-from proxcgal.models.formats.common import transform
+from proxcgal.models.mesh.shapes import capsule_between
 
-Vector = Annotated[tuple[float, ...], Field(min_length=3, max_length=3)]
 Range = Annotated[tuple[float, ...], Field(min_length=2, max_length=2)]
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
 
 
 class _Table(BaseModel):
@@ -43,8 +39,8 @@ class CapsuleLink(_Table):
     end: Vector = Field(description="[m] of the capsule's axis, in the link's frame")
     radius: Positive = Field(description="[m]")
     mass: Positive | None = Field(None, description="[kg] spread evenly over the capsule")
-    armature: NotNegative = Field(0.0, description="[kg m^2] of the drive, at the joint")
-    damping: NotNegative = Field(0.0, description="[N m s/rad] of the joint")
+    armature: NonNegative = Field(0.0, description="[kg m^2] of the drive, at the joint")
+    damping: NonNegative = Field(0.0, description="[N m s/rad] of the joint")
     brake: Positive | None = Field(None, description="[N m] that the holding brake gives")
 
     @model_validator(mode="after")
@@ -59,8 +55,8 @@ class CapsuleLink(_Table):
 class BrakeTiming(_Table):
     """How brakes close once the torque is off."""
 
-    delay: NotNegative = Field(0.03, description="[s] until they begin to")
-    rise: NotNegative = Field(0.02, description="[s] from then until they hold in full")
+    delay: NonNegative = Field(0.03, description="[s] until they begin to")
+    rise: NonNegative = Field(0.02, description="[s] from then until they hold in full")
 
 
 class Tool(_Table):
@@ -112,7 +108,7 @@ class CapsuleRobot(_Table):
         joint, T_JL = -1, np.eye(4)
         for link in self.links:
             if link.joint is None:
-                T_JL = T_JL @ transform(link.origin, link.rpy)
+                T_JL = T_JL @ pose(link.origin, link.rpy)
             else:
                 joint, T_JL = joint + 1, np.eye(4)
             found.append((joint, T_JL))
@@ -129,13 +125,13 @@ class CapsuleRobot(_Table):
                 joints.append(
                     Joint(
                         name=link.joint, type="revolute", parent=before[0],
-                        origin=before[1] @ transform(link.origin, link.rpy),
+                        origin=before[1] @ pose(link.origin, link.rpy),
                         axis=np.array(link.axis) / np.linalg.norm(link.axis),
                         q_min=low, q_max=high, qd_max=link.speed or math.nan,
                         qdd_max=link.acceleration or math.nan,
                     )
                 )  # fmt: skip
-            vertices, triangles = capsule_mesh(
+            vertices, triangles = capsule_between(
                 np.array(link.start), np.array(link.end), link.radius
             )
             links.append(
@@ -146,7 +142,7 @@ class CapsuleRobot(_Table):
         joint, T_JL = self.placed[row]
         tool = Frame(
             name=self.tool.name, joint=joint,
-            T_JF=T_JL @ transform(self.tool.position, self.tool.rpy),
+            T_JF=T_JL @ pose(self.tool.position, self.tool.rpy),
         )  # fmt: skip
         return RobotDescription(
             name=self.name, joints=tuple(joints), links=tuple(links), frames=(tool,),

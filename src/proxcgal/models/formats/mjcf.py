@@ -4,8 +4,6 @@ pinocchio reads the kinematics. It passes over in silence what it does not know 
 the top, frames, switched-off limits), so all of that is looked for first, and refused by name.
 """
 
-from __future__ import annotations
-
 import math
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -15,9 +13,10 @@ import numpy as np
 
 from proxcgal.core.errors import ModelError
 from proxcgal.models.description import listed
-from proxcgal.models.formats.common import WORLD, Shape, is_direction, numbers
 from proxcgal.models.formats.paths import MeshFolders
-from proxcgal.models.mesh.files import box, capsule, cylinder, ellipsoid
+from proxcgal.models.formats.pinocchio_model import WORLD, Shape
+from proxcgal.models.formats.safe_xml import is_direction, parse_numbers
+from proxcgal.models.mesh.shapes import box, capsule, cylinder, ellipsoid
 
 _NOT_READ = ("include", "frame", "replicate", "attach", "composite", "flexcomp", "plugin")
 _NUMBERS = {"pos": 3, "quat": 4, "axis": 3, "euler": 3, "xyaxes": 6, "zaxis": 3, "axisangle": 4}
@@ -86,7 +85,7 @@ def _check_body(body: ET.Element, names: set[str], path: Path) -> None:
                 what = (
                     f"{path}: <{element.tag}> '{element.get('name', '')}' in body '{name}', {key}"
                 )
-                values = numbers(element.get(key, ""), count, what)
+                values = parse_numbers(element.get(key, ""), count, what)
                 if key in ("axis", "quat") and not is_direction(values):
                     raise ModelError(f"{what} is all zeros, or nearly; a direction is needed")
     for joint in joints:
@@ -143,7 +142,7 @@ def shapes(model: Any, path: Path, root: ET.Element) -> dict[str, list[Shape]]:
     Raises:
         ModelError: a shape that is not read; a body that pinocchio has lost.
     """
-    import pinocchio as pin
+    import pinocchio as pin  # here, because a warm cache does without it
 
     bodies = {f.name for f in model.frames if f.type == pin.FrameType.BODY}
     if lost := [b.get("name", "") for b in root.iter("body") if b.get("name") not in bodies]:

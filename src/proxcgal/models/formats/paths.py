@@ -1,7 +1,5 @@
 """Where the mesh files of a description lie, and that they lie where they may."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -12,12 +10,12 @@ from proxcgal.core.errors import ModelError
 # A description may sit in such a folder of its package, with the meshes beside that folder.
 _DESCRIPTION_FOLDERS = {"urdf", "xacro", "robots", "robot", "mjcf", "xml", "model", "models"}
 
-SUFFIXES = (".urdf", ".xacro", ".xml", ".mjcf", ".toml")
+ROBOT_SUFFIXES = (".urdf", ".xacro", ".xml", ".mjcf", ".toml")
 
 
 def is_robot_file(name: str | os.PathLike[str]) -> bool:
     """Whether a robot's name is a path to its description, by the ending."""
-    return Path(name).suffix.lower() in SUFFIXES
+    return Path(name).suffix.lower() in ROBOT_SUFFIXES
 
 
 class MeshFolders:
@@ -71,7 +69,9 @@ class MeshFolders:
         folders = [*self.own, *self.package_dirs, *self.packages.values()]
         if not any(path.is_relative_to(folder) for folder in folders):
             self._outside(name, what, path, folders)
-        return self._existing(path, name, what)
+        if not path.is_file():
+            raise ModelError(f"{self.description}: no mesh file '{name}' of {what} at {path}")
+        return path
 
     def _in_package(self, name: str, what: str) -> Path:
         package, _, rest = name.split("://", 1)[1].partition("/")
@@ -92,11 +92,6 @@ class MeshFolders:
             f"'{package}' in {', '.join(str(p) for p in tried[:4]) or 'no folder'}. "
             "package_dirs names the folders that packages lie in"
         )
-
-    def _existing(self, path: Path, name: str, what: str) -> Path:
-        if not path.is_file():
-            raise ModelError(f"{self.description}: no mesh file '{name}' of {what} at {path}")
-        return path
 
     def _outside(self, name: str, what: str, path: Path, folders: Sequence[Path]) -> None:
         allowed = ", ".join(str(folder) for folder in folders)

@@ -1,19 +1,25 @@
-"""XML from files that may be broken or hostile: refused early, never expanded, never recursed."""
+"""XML and its numbers, from files that may be broken or hostile: refused early, never expanded."""
 
-from __future__ import annotations
-
+import math
 import xml.etree.ElementTree as ET
 from collections.abc import Collection
 from pathlib import Path
 from typing import NoReturn
 from xml.parsers import expat
 
+import numpy as np
+
 from proxcgal.core.errors import ModelError
+from proxcgal.core.typing import Array
 
 MAX_BYTES = 64 * 2**20
 MAX_DEPTH = 256  # nested tags; a chain of bodies in an MJCF nests one per joint
 MAX_ELEMENTS = 100_000
+# Farther from the origin nothing is looked for, and squares would leave single precision [m].
+FARTHEST = 1e9
 _CHUNK = 2**16
+# An axis or quaternion shorter than this has no direction.
+_NO_DIRECTION = 1e-9
 
 
 def parse_xml(path: Path, roots: Collection[str]) -> ET.Element:
@@ -27,8 +33,6 @@ def parse_xml(path: Path, roots: Collection[str]) -> ET.Element:
         ModelError: it cannot be read, is not well-formed, declares a document type or an entity,
             or goes past the bounds on size, depth and number of elements.
     """
-    if (size := _size(path)) > MAX_BYTES:
-        raise ModelError(f"{path}: {size} bytes; at most {MAX_BYTES} are read")
     builder = ET.TreeBuilder()
     parser = expat.ParserCreate()
     depth = count = 0
@@ -62,6 +66,8 @@ def parse_xml(path: Path, roots: Collection[str]) -> ET.Element:
     parser.StartDoctypeDeclHandler = doctype
     parser.EntityDeclHandler = doctype
     try:
+        if (size := path.stat().st_size) > MAX_BYTES:
+            raise ModelError(f"{path}: {size} bytes; at most {MAX_BYTES} are read")
         with path.open("rb") as file:
             while chunk := file.read(_CHUNK):
                 parser.Parse(chunk, False)
@@ -73,8 +79,33 @@ def parse_xml(path: Path, roots: Collection[str]) -> ET.Element:
     return builder.close()
 
 
-def _size(path: Path) -> int:
+def parse_number(text: str, what: str, most: float = FARTHEST) -> float:
+    """One finite number of at most that size.
+
+    Raises:
+        ModelError: it is none.
+    """
+    return float(parse_numbers(text, 1, what, most)[0])
+
+
+def parse_numbers(text: str, count: int, what: str, most: float = FARTHEST) -> Array:
+    """So many finite numbers, as they stand in an XML attribute, each of at most that size.
+
+    Raises:
+        ModelError: they are not.
+    """
     try:
-        return path.stat().st_size
-    except OSError as error:
-        raise ModelError(f"{path}: cannot be read: {error.strerror}") from None
+        values = np.array([float(token) for token in text.split()])
+    except ValueError:
+        values = np.empty(0)
+    if len(values) != count or not np.isfinite(values).all():
+        finite = "a finite number is" if count == 1 else f"{count} finite numbers are"
+        raise ModelError(f"{what} is '{text[:80]}'; {finite} needed")
+    if (np.abs(values) > most).any():
+        raise ModelError(f"{what} is '{text[:80]}'; at most {most:g} is taken")
+    return values
+
+
+def is_direction(values: Array) -> bool:
+    """Whether an axis or a quaternion says which way."""
+    return math.hypot(*values) > _NO_DIRECTION

@@ -4,8 +4,6 @@ The structure is checked before pinocchio sees it, which takes a link with two p
 and returns a shorter robot. What pinocchio gets holds links and joints only.
 """
 
-from __future__ import annotations
-
 import math
 import xml.etree.ElementTree as ET
 from collections import Counter
@@ -15,11 +13,13 @@ from pathlib import Path
 import numpy as np
 
 from proxcgal.core.errors import GeometryError, ModelError
+from proxcgal.core.transforms import pose
 from proxcgal.core.typing import Array, Ints
 from proxcgal.models.description import listed
-from proxcgal.models.formats.common import Shape, is_direction, number, numbers, transform
 from proxcgal.models.formats.paths import MeshFolders
-from proxcgal.models.mesh.files import box, cylinder, ellipsoid
+from proxcgal.models.formats.pinocchio_model import Shape
+from proxcgal.models.formats.safe_xml import is_direction, parse_number, parse_numbers
+from proxcgal.models.mesh.shapes import box, cylinder, ellipsoid
 
 MAX_LINKS = 1000
 _AXIS = "1 0 0"  # where none is given
@@ -120,7 +120,7 @@ def _check_joint(element: ET.Element, name: str, path: Path) -> None:
             raise ModelError(f"{what} is {kind} and has no <limit>; lower and upper are needed")
         return
     for key in ("lower", "upper", "velocity"):
-        number(limit.get(key, "0"), f"{what}, limit {key}", math.inf)
+        parse_number(limit.get(key, "0"), f"{what}, limit {key}", math.inf)
     lower, upper = (float(limit.get(key, "0")) for key in ("lower", "upper"))
     if kind != "continuous" and not lower < upper:
         raise ModelError(f"{what} has lower limit {lower} and upper limit {upper}; lower < upper")
@@ -182,26 +182,26 @@ def _shape(element: ET.Element, link: str, folders: MeshFolders) -> Shape | None
     if geometry is None or not len(geometry):
         return None
     kind = geometry[0]
-    pose = _origin(element, where)
+    T_LS = _origin(element, where)
     if kind.tag == "mesh":
-        scale = numbers(kind.get("scale", "1 1 1"), 3, f"{where}, mesh scale")
+        scale = parse_numbers(kind.get("scale", "1 1 1"), 3, f"{where}, mesh scale")
         if (scale == 0).any():
             raise ModelError(f"{where} has mesh scale {scale.tolist()}; 0 leaves no surface")
-        return Shape(pose, file=folders.find(kind.get("filename", ""), what), scale=scale)
+        return Shape(T_LS, file=folders.find(kind.get("filename", ""), what), scale=scale)
     made: tuple[Array, Ints]
     if kind.tag == "box":
-        made = box(_positive(numbers(kind.get("size", ""), 3, f"{where}, box size"), where))
+        made = box(_positive(parse_numbers(kind.get("size", ""), 3, f"{where}, box size"), where))
     elif kind.tag == "cylinder":
-        sizes = [number(kind.get(key, ""), f"{where}, cylinder {key}") for key in
+        sizes = [parse_number(kind.get(key, ""), f"{where}, cylinder {key}") for key in
                  ("radius", "length")]  # fmt: skip
         radius, length = _positive(np.array(sizes), where)
         made = cylinder(radius, length)
     elif kind.tag == "sphere":
-        radius = number(kind.get("radius", ""), f"{where}, sphere radius")
+        radius = parse_number(kind.get("radius", ""), f"{where}, sphere radius")
         made = ellipsoid(_positive(np.full(3, radius), where))
     else:
         raise ModelError(f"{where} has shape <{kind.tag}>; mesh, box, cylinder, sphere are read")
-    return Shape(pose, mesh=made)
+    return Shape(T_LS, mesh=made)
 
 
 def _positive(sizes: Array, where: str) -> Array:
@@ -217,15 +217,15 @@ def _origin(element: ET.Element, what: str) -> Array:
     origin = element.find("origin")
     if origin is None:
         return np.eye(4)
-    return transform(
-        numbers(origin.get("xyz", "0 0 0"), 3, f"{what}, origin xyz"),
-        numbers(origin.get("rpy", "0 0 0"), 3, f"{what}, origin rpy"),
+    return pose(
+        parse_numbers(origin.get("xyz", "0 0 0"), 3, f"{what}, origin xyz"),
+        parse_numbers(origin.get("rpy", "0 0 0"), 3, f"{what}, origin rpy"),
     )
 
 
 def _axis(element: ET.Element, what: str) -> Array:
     axis = element.find("axis")
-    return numbers(_AXIS if axis is None else axis.get("xyz", _AXIS), 3, f"{what}, axis")
+    return parse_numbers(_AXIS if axis is None else axis.get("xyz", _AXIS), 3, f"{what}, axis")
 
 
 def _name(element: ET.Element, tag: str, path: Path) -> str:

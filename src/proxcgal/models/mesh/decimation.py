@@ -9,8 +9,6 @@ Source: M. Garland and P. Heckbert, Surface simplification using quadric error m
 are taken in rounds of collapses that do not touch one another, so that each round is array work.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from proxcgal._core import MeshTree

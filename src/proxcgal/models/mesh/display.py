@@ -1,7 +1,5 @@
 """Meshes that are looked at: about a thousand vertices a link, made once and kept."""
 
-from __future__ import annotations
-
 from weakref import WeakKeyDictionary
 
 import numpy as np

@@ -1,6 +1,4 @@
-"""Mesh files and simple shapes as clean triangles: welded, finite, without empty faces."""
-
-from __future__ import annotations
+"""Mesh files as clean triangles: welded, finite, without empty faces."""
 
 import io
 import os
@@ -10,20 +8,16 @@ import numpy as np
 
 from proxcgal.core.errors import GeometryError
 from proxcgal.core.typing import Array, Ints
-from proxcgal.models.formats.safe_xml import parse_xml
+from proxcgal.models.formats.safe_xml import FARTHEST, parse_xml
 from proxcgal.models.mesh.triangles import compact, double_areas
 
 MAX_FACES = 5_000_000
 MAX_MESH_BYTES = 512 * 2**20
-SUFFIXES = (".stl", ".obj", ".dae", ".ply", ".off")
-# Farther from the origin nothing is looked for, and squares would leave single precision [m].
-FARTHEST = 1e9
+MESH_SUFFIXES = (".stl", ".obj", ".dae", ".ply", ".off")
 # Vertices closer than this are one [m].
 _WELD = 1e-7
 # A face whose doubled area is below this share of its longest side squared has none.
 _NO_AREA = 1e-9
-# A round shape is drawn with this many corners: at radius 0.2 m its facets lie within 0.3 mm.
-_ROUND = 60
 
 
 def load_mesh(path: str | os.PathLike[str]) -> tuple[Array, Ints]:
@@ -41,8 +35,8 @@ def load_mesh(path: str | os.PathLike[str]) -> tuple[Array, Ints]:
     """
     path = Path(path)
     suffix = path.suffix.lower()
-    if suffix not in SUFFIXES:
-        raise GeometryError(f"{path}: not a mesh file; {', '.join(SUFFIXES)} are read")
+    if suffix not in MESH_SUFFIXES:
+        raise GeometryError(f"{path}: not a mesh file; {', '.join(MESH_SUFFIXES)} are read")
     try:
         size = path.stat().st_size
         if size > MAX_MESH_BYTES:
@@ -88,7 +82,7 @@ def check_mesh(vertices: Array, triangles: Ints, what: str) -> None:
         raise GeometryError(f"{what}: vertex {row} is {vertices[row].tolist()}{where}")
 
 
-def clean(vertices: Array, triangles: Ints, what: str) -> tuple[Array, Ints, int]:
+def clean_mesh(vertices: Array, triangles: Ints, what: str) -> tuple[Array, Ints, int]:
     """Join vertices that coincide and leave out faces without area.
 
     Returns:
@@ -188,50 +182,3 @@ def _read_with_trimesh(data: bytes, path: Path) -> tuple[Array, Ints]:
     vertices = np.asarray(mesh.vertices, dtype=np.float64).reshape(-1, 3)
     with np.errstate(over="ignore"):  # what overflows is refused as not finite
         return vertices * unit, np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)
-
-
-def box(size: Array) -> tuple[Array, Ints]:
-    """A box of the given full size (3,) [m] round the origin."""
-    corner = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-    faces = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
-             [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]  # fmt: skip
-    return corner * size, np.array(faces)
-
-
-def cylinder(radius: float, length: float) -> tuple[Array, Ints]:
-    """A closed cylinder along z round the origin [m]."""
-    return _turned([(0.0, -length / 2), (radius, -length / 2), (radius, length / 2),
-                    (0.0, length / 2)])  # fmt: skip
-
-
-def ellipsoid(radii: Array) -> tuple[Array, Ints]:
-    """An ellipsoid with semi-axes (3,) [m] round the origin; a sphere where they are equal."""
-    angle = np.linspace(-np.pi / 2, np.pi / 2, _ROUND // 2 + 1)
-    vertices, triangles = _turned(list(zip(np.cos(angle), np.sin(angle), strict=True)))
-    return vertices * radii, triangles
-
-
-def capsule(radius: float, length: float) -> tuple[Array, Ints]:
-    """A capsule along z round the origin; `length` is that of its straight part [m]."""
-    low = np.linspace(-np.pi / 2, 0, _ROUND // 4 + 1)
-    profile = [(radius * np.cos(a), radius * np.sin(a) - length / 2) for a in low]
-    return _turned(profile + [(r, -z) for r, z in reversed(profile)])
-
-
-def _turned(profile: list[tuple[float, float]]) -> tuple[Array, Ints]:
-    """A profile of (radius, z), from the axis to the axis, turned about z."""
-    angle = 2 * np.pi * np.arange(_ROUND) / _ROUND
-    rings = [np.stack([r * np.cos(angle), r * np.sin(angle), np.full(_ROUND, z)], axis=1)
-             for r, z in profile[1:-1]]  # fmt: skip
-    poles = np.array([[0.0, 0.0, profile[0][1]], [0.0, 0.0, profile[-1][1]]])
-    vertices = np.concatenate([*rings, poles])
-    here, after = np.arange(_ROUND), (np.arange(_ROUND) + 1) % _ROUND
-    south, north = len(vertices) - 2, len(vertices) - 1
-    faces = [np.stack([np.full(_ROUND, south), after, here], axis=1)]
-    for ring in range(len(rings) - 1):
-        low, high = ring * _ROUND, (ring + 1) * _ROUND
-        faces.append(np.stack([low + here, low + after, high + after], axis=1))
-        faces.append(np.stack([low + here, high + after, high + here], axis=1))
-    top = (len(rings) - 1) * _ROUND
-    faces.append(np.stack([np.full(_ROUND, north), top + here, top + after], axis=1))
-    return vertices, np.concatenate(faces)

@@ -3,8 +3,6 @@
 Source: M. Garland and P. Heckbert, Surface simplification using quadric error metrics, 1997.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from proxcgal.core.typing import Array, Bools, Ints

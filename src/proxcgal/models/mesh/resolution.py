@@ -1,7 +1,5 @@
 """The controller's meshes: as many vertices as asked for, the surface where it was."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """More triangles on the same surface: the longest edge first, halved."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from proxcgal.core.typing import Array, Ints

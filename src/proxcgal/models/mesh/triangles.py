@@ -1,7 +1,5 @@
 """Array work on triangle surfaces: edges, rims, neighbours, distances."""
 
-from __future__ import annotations
-
 from typing import TypeGuard
 
 import numpy as np

@@ -1,11 +1,10 @@
 """The body as capsules between points: which there are, how thick, where they stand."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
 
+from proxcgal.core.transforms import least_rotations_of_z
 from proxcgal.core.typing import Array
 from proxcgal.scene.human.subject import radius
 
@@ -79,29 +78,13 @@ def segments(points_W: Array, thickness: Array) -> tuple[Array, Array]:
     return start, end - along * inset * np.array([not p.open_end for p in PARTS])[:, None]
 
 
-def upright(along: Array) -> Array:
-    """(..., 3, 3) rotations that turn the world's z axis the least to bring it along (..., 3)."""
-    z = along / np.maximum(np.linalg.norm(along, axis=-1, keepdims=True), 1e-12)
-    x, y, c = z[..., 0], z[..., 1], z[..., 2]
-    level2 = x * x + y * y
-    down = (c < 0.0) & (level2 < 1e-30)  # no turn is the least one
-    # 1 / (1 + c), which cancels where the direction leads down.
-    k = np.where(c < 0.0, (1.0 - c) / np.maximum(level2, 1e-30), 1.0 / (1.0 + np.maximum(c, 0.0)))
-    R = np.empty((*z.shape[:-1], 3, 3))
-    R[..., 0, 0], R[..., 0, 1], R[..., 0, 2] = 1.0 - k * x * x, -k * x * y, x
-    R[..., 1, 0], R[..., 1, 1], R[..., 1, 2] = -k * x * y, 1.0 - k * y * y, y
-    R[..., 2, 0], R[..., 2, 1], R[..., 2, 2] = -x, -y, c
-    R[down] = np.diag((1.0, -1.0, -1.0))
-    return R
-
-
 def poses(start: Array, end: Array) -> Array:
     """(..., parts, 4, 4) T_WO of capsules between their round ends' centres (..., parts, 3) [m].
 
     The z axis leads upwards in somebody who stands with hanging arms.
     """
     T_WO = np.zeros((*start.shape[:-1], 4, 4))
-    T_WO[..., :3, :3] = upright((end - start) * _UP[:, None])
+    T_WO[..., :3, :3] = least_rotations_of_z((end - start) * _UP[:, None])
     T_WO[..., :3, 3] = 0.5 * (start + end)
     T_WO[..., 3, 3] = 1.0
     return T_WO

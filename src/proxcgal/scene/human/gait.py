@@ -1,7 +1,5 @@
 """Steps: feet that stand still while the body passes over them, then swing to their next place."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

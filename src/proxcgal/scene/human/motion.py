@@ -1,7 +1,5 @@
 """What a virtual subject does on a timeline: walks, turns, leans, reaches."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,7 +8,7 @@ from proxcgal.core.errors import ConfigError
 from proxcgal.core.typing import Array
 from proxcgal.scene.human import gait
 from proxcgal.scene.human.body import POINTS
-from proxcgal.scene.human.operator import Operator, Step
+from proxcgal.scene.human.operator_keys import Operator, Step
 from proxcgal.scene.human.smooth import Glide, Track, least_duration, minimum_jerk, slerp, two_bones
 from proxcgal.scene.human.stance import (
     CARRYING,
@@ -68,12 +66,10 @@ def move(subject: Subject, operator: Operator, duration: float) -> Motion:
         ConfigError: a place that the subject cannot reach from its mark, or not in time.
     """
     time = np.arange(int(np.ceil(duration * HZ)) + 1) / HZ
-    side = 1.0 if subject.left_handed else -1.0
     start = np.array(operator.marks[operator.start]) + subject.aside
     first = np.array(operator.marks[operator.timeline[0].mark]) + subject.aside
-    heading = first - start
-    here = Stance(start, float(np.arctan2(heading[1], heading[0])))
-    plan = _Plan(side, Track(0.0), Track(here.yaw))
+    here = Stance(start, _facing(start, first))
+    plan = _Plan(subject.side, Track(0.0), Track(here.yaw))
     rest = HANGING
     ready = 0.0
     for row, step in enumerate(operator.timeline):
@@ -92,13 +88,11 @@ def move(subject: Subject, operator: Operator, duration: float) -> Motion:
 
 def _goal(subject: Subject, operator: Operator, row: int, step: Step, here: Stance) -> Stance:
     mark = np.array(operator.marks[step.mark])
-    side = 1.0 if subject.left_handed else -1.0
     if step.reach is None:
         feet = mark + subject.aside
-        way = feet - here.feet
-        return Stance(feet, float(np.arctan2(way[1], way[0])))
+        return Stance(feet, _facing(here.feet, feet))
     place = np.array(operator.places[step.reach])
-    stance = stance_for(subject, side, operator.floor, mark, place)
+    stance = stance_for(subject, subject.side, operator.floor, mark, place)
     if stance is None:
         raise ConfigError(
             f"operator.timeline.{row}: subject {operator.subject} (draw {operator.draw}, "

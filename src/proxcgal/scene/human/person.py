@@ -1,7 +1,5 @@
 """A person as a scene: capsules, and where they are and how they move at any time."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np
@@ -9,10 +7,10 @@ import numpy as np
 from proxcgal.core.typing import Array
 from proxcgal.scene.human import body
 from proxcgal.scene.human.motion import Motion, move
-from proxcgal.scene.human.operator import Operator
+from proxcgal.scene.human.operator_keys import Operator
 from proxcgal.scene.human.recorded import read_motion
 from proxcgal.scene.human.subject import draw_subject
-from proxcgal.scene.solids import Capsule, Solid
+from proxcgal.scene.solids import CapsuleSolid, Solid
 
 
 class Person:
@@ -32,7 +30,7 @@ class Person:
         lengths = np.median(np.linalg.norm(self._end - self._start, axis=2), axis=0)
         self.names: tuple[str, ...] = body.NAMES
         self.solids: tuple[Solid, ...] = tuple(
-            Capsule(float(radius), float(length))
+            CapsuleSolid(float(radius), float(length))
             for radius, length in zip(thickness, lengths, strict=True)
         )
         self._poses = body.poses(self._start, self._end)

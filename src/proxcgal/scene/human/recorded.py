@@ -1,7 +1,5 @@
 """A recorded motion, such as a motion capture gives it, in place of a virtual subject's."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

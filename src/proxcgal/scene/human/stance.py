@@ -1,7 +1,5 @@
 """Where somebody stands, and how they lean, so that a hand reaches a place."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -6,8 +6,6 @@ densities: Winter, anthropometric data; a capsule is as thick as the cylinder th
 segment's length and volume.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,6 +44,11 @@ class Subject:
     aside: tuple[float, float]  #: stance: [m] from the mark on the floor
     reactions: tuple[float, ...]  #: [s] after each signal; they begin again after the last
     left_handed: bool = False
+
+    @property
+    def side(self) -> float:
+        """Of the reaching hand: 1 left, -1 right."""
+        return 1.0 if self.left_handed else -1.0
 
     @property
     def upper_arm(self) -> float:

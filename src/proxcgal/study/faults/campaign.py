@@ -10,13 +10,14 @@ import polars as pl
 
 from proxcgal.core import modes
 from proxcgal.core.errors import ConfigError
+from proxcgal.core.progress import OnProgress
 from proxcgal.evaluation.metrics import Summary
-from proxcgal.scenario.keys import FAULT_VALUES
-from proxcgal.scenario.loading import Scenario, load_scenario
+from proxcgal.evaluation.trial_log import TrialLog
+from proxcgal.scenario.fault_keys import FAULT_VALUES
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.scenario.scenario import Scenario
 from proxcgal.scenario.setup import Setup
-from proxcgal.sim.mount_faults import look
-from proxcgal.sim.source import SimulatedSource
-from proxcgal.sim.world import World
+from proxcgal.sim.assembly import Assembly
 from proxcgal.study.campaign import Campaign, Trial
 from proxcgal.study.campaign_kind import CampaignKind, CampaignRequest
 from proxcgal.study.campaign_plan import CampaignPlan
@@ -24,9 +25,7 @@ from proxcgal.study.campaign_store import Row as Numbers
 from proxcgal.study.faults.cases import ROW_OF, ROWS, TICK_MS, Fault, Row
 from proxcgal.study.faults.figures import figures
 from proxcgal.study.faults.texts import captions, listings, pages, verdicts
-from proxcgal.study.jobs import ShareReport
 from proxcgal.study.trial_simulation import robot_of, simulate_trial
-from proxcgal.trial.trial import TrialLog
 
 #: Scenes in which the arm moves, and every sensor sees a room.
 SCENES = ("timing_ur10e", "timing_panda")
@@ -93,8 +92,7 @@ def _refuse_short(base: Scenario) -> None:
 
 def _visible(setup: Setup) -> list[tuple[int, str]]:
     """Sensors and directions in which a wrong mount can be found at the scene's start."""
-    source = SimulatedSource(setup, World(setup.robot, setup.scene), seed=0)
-    checks = look(setup, source).sensors
+    checks = Assembly.of(setup, "wb", seed=0).mount_checks().sensors
     return [(check.sensor, axis) for check in checks for axis in check.visible]
 
 
@@ -124,7 +122,7 @@ def _assignment(faults: Any, start: float, end: float) -> str:
     return f"fault=[{', '.join(tables)}]"
 
 
-def perform(trial: Trial, report: ShareReport) -> Numbers:
+def perform(trial: Trial, report: OnProgress) -> Numbers:
     """One trial beside its row's requirements."""
     row = ROW_OF[str(trial.tags["row"])]
     if row.refused:
@@ -158,11 +156,11 @@ def perform(trial: Trial, report: ShareReport) -> Numbers:
     }
 
 
-def _refused(trial: Trial, report: ShareReport) -> Numbers:
+def _refused(trial: Trial, report: OnProgress) -> Numbers:
     """Is that very sensor found before the run, and no other?"""
     setup = Setup.of(trial.scenario, robot_of(trial.scenario, trial.robot_digest))
-    source = SimulatedSource(setup, World(setup.robot, setup.scene), trial.seed)
-    wrong = [check.sensor for check in look(setup, source).wrong]
+    checks = Assembly.of(setup, trial.controller, trial.seed).mount_checks()
+    wrong = [check.sensor for check in checks.wrong]
     report(1.0)
     found = wrong == [fault.sensor for fault in trial.scenario.faults]
     return {
@@ -172,13 +170,13 @@ def _refused(trial: Trial, report: ShareReport) -> Numbers:
     }  # fmt: skip
 
 
-def _same(trial: Trial, log: TrialLog, report: ShareReport) -> bool:
+def _same(trial: Trial, log: TrialLog, report: OnProgress) -> bool:
     """Are the commands those of the same trial without the fault?"""
     other = _simulate(trial, trial.scenario.model_copy(update={"faults": ()}), report)
     return bool(np.array_equal(log.qd, other.qd))
 
 
-def _simulate(trial: Trial, scenario: Scenario, report: ShareReport) -> TrialLog:
+def _simulate(trial: Trial, scenario: Scenario, report: OnProgress) -> TrialLog:
     return simulate_trial(
         scenario, trial.controller, trial.seed, report,
         robot_digest=trial.robot_digest, without_truth=True,

@@ -6,18 +6,18 @@ from dataclasses import dataclass
 from typing import Any
 
 from proxcgal.core.modes import RUN
-from proxcgal.evaluation.metrics import counted
+from proxcgal.core.tables import counted
 from proxcgal.study.faults.cases import Row
 
-_CONTROLLER = "cpp/tests/test_controller.cpp"
-_STALENESS = "cpp/tests/test_staleness.cpp"
-_CONTACT = "cpp/tests/test_contact.cpp"
-_CLOCK = "cpp/tests/test_clock.cpp"
-_REMEMBERING = "cpp/tests/test_remembering.cpp"
-_MISBEHAVIOUR = "cpp/tests/test_misbehaviour.cpp"
-_COMMAND = "cpp/tests/test_admissible.cpp"
-_MESH = "cpp/tests/test_mesh_tree.cpp"
-_PIPELINE = "cpp/tests/test_pipeline.cpp"
+_CONTROLLER = "cpp/tests/control/test_controller.cpp"
+_STALENESS = "cpp/tests/perception/test_staleness.cpp"
+_CONTACT = "cpp/tests/control/test_contact.cpp"
+_CLOCK = "cpp/tests/perception/test_clock.cpp"
+_REMEMBERING = "cpp/tests/perception/test_remembering.cpp"
+_MISBEHAVIOUR = "cpp/tests/control/test_misbehaviour.cpp"
+_COMMAND = "cpp/tests/pipeline/test_admissible.cpp"
+_MESH = "cpp/tests/geometry/test_mesh_tree.cpp"
+_PIPELINE = "cpp/tests/pipeline/test_pipeline.cpp"
 _FUZZ = "cpp/tests/test_fuzz.cpp"
 _SERVER = "tests/server/test_joint_server.py"
 _RECORDING = "tests/recording/test_recording.py"
@@ -96,7 +96,7 @@ SHOWN: tuple[Shown, ...] = (
     Shown("conflicting tasks", "the safety level's residual stays best, the others' are told",
           ((_MISBEHAVIOUR,
             "AgainstAConflictingGoalTheSafetyLevelKeepsItsBestAndBothTellWhatIsMissing"),
-           ("cpp/tests/test_solve.cpp", "TheFirstLevelKeepsItsOptimumAboveAnyOther"))),
+           ("cpp/tests/pipeline/test_solve.cpp", "TheFirstLevelKeepsItsOptimumAboveAnyOther"))),
     Shown("obstacle at the surface, inside it, or taken for body", "kept until seen outside; every "
           "command leads out",
           ((_CONTACT, "AnObstacleThatTouchesIsNotTakenForBody"),

@@ -9,8 +9,11 @@ import numpy as np
 import polars as pl
 
 from proxcgal.core.errors import ConfigError
+from proxcgal.core.progress import OnProgress
 from proxcgal.evaluation.phases import SAMPLES_HZ
-from proxcgal.scenario.loading import CONTROLLERS, HriScenario, load_scenario
+from proxcgal.scenario.hri_scenario import HriScenario
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.scenario.scenario import CONTROLLERS
 from proxcgal.study.campaign import Campaign, Trial, file_name
 from proxcgal.study.campaign_kind import CampaignKind, CampaignRequest
 from proxcgal.study.campaign_plan import CampaignPlan
@@ -21,7 +24,6 @@ from proxcgal.study.hri.metrics import analyse
 from proxcgal.study.hri.paper_tables import listings
 from proxcgal.study.hri.texts import captions, introduction, verdicts
 from proxcgal.study.hri.trial_metrics import COLUMNS, trial_metrics
-from proxcgal.study.jobs import ShareReport
 from proxcgal.study.trial_simulation import simulate_trial
 
 SCENES = ("hri_task1", "hri_task2")
@@ -120,7 +122,7 @@ def _operated(source: str, overrides: tuple[str, ...]) -> HriScenario:
     return scenario
 
 
-def perform(trial: Trial, report: ShareReport) -> Row:
+def perform(trial: Trial, report: OnProgress) -> Row:
     """One trial's numbers and, at the sensors' rate, its course."""
     log = simulate_trial(
         trial.scenario, trial.controller, trial.seed, report, robot_digest=trial.robot_digest,

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from proxcgal.core.errors import ConfigError
-from proxcgal.scenario.loading import HriScenario, change_scenario
+from proxcgal.scenario.hri_scenario import HriScenario
+from proxcgal.scenario.loading import change_scenario
 
 JITTER_M = 0.1  # [m] to either side, along each axis
 _STREAM = 0x4A6974  # of the seed: subjects and noise draw from others

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from proxcgal.evaluation.metrics import Summary, shown
+from proxcgal.core.tables import in_metres
+from proxcgal.evaluation.metrics import Summary
 from proxcgal.study.hri.metrics import compared
 from proxcgal.study.listing import Listing
 
@@ -134,9 +135,9 @@ def _table(table: Mapping[str, Any], paper: Mapping[str, Any]) -> Iterator[tuple
             if mean is not None and cell["seen_mean_m"] is not None:
                 apart = f"{cell['seen_mean_m'] - mean:+.3f}"
             yield (
-                name, ROW_NAMES.get(row, row), shown(cell["seen_mean_m"]),
-                shown(cell["seen_sigma_max_m"]), shown(mean), shown(sigma), apart,
-                shown(cell["mean_m"]), shown(cell["sigma_max_m"]),
+                name, ROW_NAMES.get(row, row), in_metres(cell["seen_mean_m"]),
+                in_metres(cell["seen_sigma_max_m"]), in_metres(mean), in_metres(sigma), apart,
+                in_metres(cell["mean_m"]), in_metres(cell["sigma_max_m"]),
             )  # fmt: skip
 
 
@@ -162,7 +163,7 @@ def _close(calls: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
         yield (
             name, str(numbers["trials"]), str(numbers["too_close_trials"]),
             str(numbers["too_close_ticks"]), str(numbers["blind_trials"]),
-            str(numbers["blind_ticks"]), shown(numbers["true_min_m"]),
+            str(numbers["blind_ticks"]), in_metres(numbers["true_min_m"]),
             *(f"{100.0 * numbers[key] / max(numbers['ticks'], 1):.1f}"
               for key in ("empty_ticks", "held_ticks")),
         )  # fmt: skip

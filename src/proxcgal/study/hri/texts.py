@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from proxcgal.evaluation.metrics import SELF_LIMIT_M, Summary, counted
+from proxcgal.core.tables import counted
+from proxcgal.evaluation.metrics import SELF_LIMIT_M, Summary
 from proxcgal.study.hri.metrics import compared, held
 from proxcgal.study.hri.paper_tables import ROW_NAMES, layouts
 

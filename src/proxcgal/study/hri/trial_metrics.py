@@ -10,7 +10,7 @@ from proxcgal.core.modes import HOLD
 from proxcgal.core.typing import Array
 from proxcgal.evaluation.phases import SAMPLES_HZ, mean_distances
 from proxcgal.evaluation.trial_log import TOO_CLOSE, TrialLog, sampled_ticks
-from proxcgal.scenario.loading import HriScenario
+from proxcgal.scenario.hri_scenario import HriScenario
 from proxcgal.study.campaign_store import Row, Series
 from proxcgal.study.trial_simulation import robot_of
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 import polars as pl
 
 from proxcgal.core.errors import ConfigError
+from proxcgal.core.progress import OnProgress
 from proxcgal.evaluation.metrics import SELF_LIMIT_M, Summary
 from proxcgal.models.macro_micro import part
-from proxcgal.scenario.joint import JointScenario
+from proxcgal.scenario.joint_scenario import JointScenario
 from proxcgal.scenario.loading import load_scenario
 from proxcgal.study.campaign import Campaign, Trial
 from proxcgal.study.campaign_kind import CampaignKind, CampaignRequest
 from proxcgal.study.campaign_plan import CampaignPlan
 from proxcgal.study.campaign_store import Row
-from proxcgal.study.jobs import ShareReport
 from proxcgal.study.joint.figures import figures
 from proxcgal.study.joint.metrics import COLUMNS, joint_metrics
 from proxcgal.study.joint.texts import captions, listings, verdicts
@@ -79,7 +79,7 @@ def plan(request: CampaignRequest) -> Campaign:
     return campaign.campaign(perform, COLUMNS)
 
 
-def perform(trial: Trial, report: ShareReport) -> Row:
+def perform(trial: Trial, report: OnProgress) -> Row:
     """One run's numbers."""
     log = simulate_trial(
         trial.scenario, trial.controller, trial.seed, report, robot_digest=trial.robot_digest

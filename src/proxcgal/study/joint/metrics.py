@@ -7,14 +7,15 @@ from typing import Any
 
 import numpy as np
 
+from proxcgal.core.files import NOTHING_M
 from proxcgal.core.modes import HOLD
 from proxcgal.core.typing import Array
 from proxcgal.evaluation.ground_truth import GroundTruth
-from proxcgal.evaluation.metrics import NOTHING_M
-from proxcgal.models import Robot, macro_micro
-from proxcgal.scenario.loading import Scenario
+from proxcgal.evaluation.trial_log import TrialLog
+from proxcgal.models import macro_micro
+from proxcgal.models.robots import Robot
+from proxcgal.scenario.scenario import Scenario
 from proxcgal.study.campaign_store import Row
-from proxcgal.trial.trial import TrialLog
 
 SERIES_S = 0.1  # [s] between the points of a curve
 COLUMNS = (

@@ -6,7 +6,9 @@ from collections.abc import Iterator, Sequence
 from statistics import median
 from typing import Any
 
-from proxcgal.evaluation.metrics import NOTHING_M, SELF_LIMIT_M, Summary, shown
+from proxcgal.core.files import NOTHING_M
+from proxcgal.core.tables import in_metres
+from proxcgal.evaluation.metrics import SELF_LIMIT_M, Summary
 from proxcgal.evaluation.trial_log import TOO_CLOSE
 from proxcgal.study.campaign import file_name
 from proxcgal.study.listing import Listing
@@ -65,9 +67,10 @@ def _known_row(run: Run) -> tuple[str, ...]:
     return (
         run["scenario"], run["init"], run["stack"], end,
         f"{run['time_s']:.1f}", f"{run['position_error_m']:.3f}", f"{run['angle_error_rad']:.3f}",
-        shown(run["true_min_m"]), f"{run['min_altitude_m']:.3f}", f"{run['limit_margin_rad']:.2f}",
+        in_metres(run["true_min_m"]), f"{run['min_altitude_m']:.3f}",
+        f"{run['limit_margin_rad']:.2f}",
         f"{run['manipulability_macro']:.3f}", f"{run['manipulability_micro']:.3f}",
-        f"{100.0 * run['macro_share']:.0f}", shown(run["self_min_m"]),
+        f"{100.0 * run['macro_share']:.0f}", in_metres(run["self_min_m"]),
     )  # fmt: skip
 
 
@@ -79,8 +82,9 @@ def _sensed_rows(runs: Sequence[Run]) -> Iterator[tuple[str, ...]]:
         close = [run for run in own if run["true_min_m"] < TOO_CLOSE]
         yield (
             scene, init, PERCEPTION_NAMES.get(perception, perception), nearest["true_min_link"],
-            str(len(own)), str(_reached(own)), shown(nearest["true_min_m"]),
-            shown(median(run["true_min_m"] for run in own)), str(len(close)), str(_unseen(close)),
+            str(len(own)), str(_reached(own)), in_metres(nearest["true_min_m"]),
+            in_metres(median(run["true_min_m"] for run in own)), str(len(close)),
+            str(_unseen(close)),
         )  # fmt: skip
 
 

@@ -6,11 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from proxcgal.core.progress import Progress, announce
+from proxcgal.core.files import finite, write_bytes, write_json
+from proxcgal.core.progress import ProgressBar, announce
 from proxcgal.evaluation.blind_volume import REACH_M, blind_volume
 from proxcgal.evaluation.ground_truth import GroundTruth
-from proxcgal.evaluation.metrics import coverage_lines, finite, write_bytes, write_json
-from proxcgal.scenario.loading import Scenario
+from proxcgal.evaluation.metrics import coverage_lines
+from proxcgal.scenario.scenario import Scenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.study.coverage_figure import coverage_figure
 from proxcgal.study.plotting import png
@@ -39,7 +40,7 @@ def run_coverage(
     check_setup(scenario, (controller,), quiet=quiet)
     setup = Setup.of(scenario)
     ready_folders([folder])
-    with Progress("simulating", [scenario.duration], "s", quiet=quiet) as progress:
+    with ProgressBar("simulating", [scenario.duration], "s", quiet=quiet) as progress:
         log = run_trial(
             scenario, controller, robot=setup.robot, sparse_truth=True, coverage=True,
             on_progress=lambda share: progress.shares([share]),

@@ -9,11 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from proxcgal.core.errors import ConfigError
+from proxcgal.core.files import write_bytes, write_json, write_text
 from proxcgal.core.provenance import origin
-from proxcgal.evaluation.metrics import SELF_LIMIT_M, Summary, write_bytes, write_json, write_text
+from proxcgal.evaluation.metrics import SELF_LIMIT_M, Summary
+from proxcgal.evaluation.trial_log import TrialLog
 from proxcgal.models.macro_micro import part
-from proxcgal.scenario.controller import STACKS
-from proxcgal.scenario.joint import JointScenario
+from proxcgal.scenario.controller_keys import STACKS
+from proxcgal.scenario.joint_scenario import JointScenario
 from proxcgal.study.joint.figures import joint_figure
 from proxcgal.study.joint.metrics import joint_metrics
 from proxcgal.study.joint.texts import listings, verdicts
@@ -23,7 +25,6 @@ from proxcgal.study.runs.setup_check import check_setup
 from proxcgal.study.runs.simulation import simulate_all
 from proxcgal.study.trial_simulation import robot_of, simulate_trial
 from proxcgal.study.workers import Pool, default_workers
-from proxcgal.trial.trial import TrialLog
 
 FIGURE = "joint.png"
 _PERCEPTIONS = {"wb_known": "known", "wb_memory": "memory", "sm": "sensed, sensor points"}

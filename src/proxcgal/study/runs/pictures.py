@@ -8,23 +8,24 @@ from pathlib import Path
 import numpy as np
 
 from proxcgal.core.errors import SimulationError
-from proxcgal.evaluation.metrics import write_bytes
+from proxcgal.core.files import write_bytes
+from proxcgal.core.progress import OnProgress
+from proxcgal.evaluation.trial_log import TrialLog
 from proxcgal.recording.reader import read_recording
-from proxcgal.scenario.loading import HriScenario, Scenario
+from proxcgal.scenario.hri_scenario import HriScenario
+from proxcgal.scenario.scenario import Scenario
 from proxcgal.scenario.setup import Setup
-from proxcgal.study.jobs import ShareReport
 from proxcgal.study.motion_picture import MOVING, STILL, bearing_for, motion_picture
 from proxcgal.study.pair_figure import pair_figure, sensor_view, whole_body_view
 from proxcgal.study.plotting import Signals, png
 from proxcgal.study.time_figure import time_figure
-from proxcgal.trial.trial import TrialLog
 
 DRAWN_SPACING_M = 0.03  # [m] between the obstacle's points in a figure
 SIDE_BY_SIDE = ("wb", "sm")  # controllers in the moving picture
 
 
 def draw_figures(
-    scenario: Scenario, logs: Sequence[TrialLog], folder: Path, report: ShareReport
+    scenario: Scenario, logs: Sequence[TrialLog], folder: Path, report: OnProgress
 ) -> str:
     """Draws `distance.png` and, where a posture shows a pair, `pairs.png`; what was drawn."""
     settings = scenario.controller
@@ -73,7 +74,7 @@ def _draw_pairs(scenario: Scenario, logs: Sequence[TrialLog], folder: Path) -> s
     return ", pairs.png"
 
 
-def draw_motion(scenario: Scenario, folder: Path, report: ShareReport) -> str:
+def draw_motion(scenario: Scenario, folder: Path, report: OnProgress) -> str:
     """Draws `motion.gif` and `motion.png` from the folder's recordings; what was drawn, or why not.
 
     A machine that cannot draw off screen still gets all its numbers and figures.

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from proxcgal.core.errors import ConfigError
-from proxcgal.scenario.loading import CONTROLLERS
+from proxcgal.scenario.scenario import CONTROLLERS
 from proxcgal.study.campaign_store import MANIFEST
 
 #: What a run writes. Older ones are removed before a run begins: an interrupted run must not leave

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from proxcgal.scenario.joint import JointScenario
-from proxcgal.scenario.loading import Scenario
-from proxcgal.scenario.walkthrough import WalkScenario
+from proxcgal.scenario.joint_scenario import JointScenario
+from proxcgal.scenario.scenario import Scenario
+from proxcgal.scenario.walkthrough_scenario import WalkScenario
 from proxcgal.study.runs.joint import run_joint
 from proxcgal.study.runs.scenes import ScenePlan, run_scenes
 from proxcgal.study.runs.walkthrough import run_walkthrough

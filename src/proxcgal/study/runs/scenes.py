@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from proxcgal.core.progress import Progress
+from proxcgal.core.files import write_json, write_text
+from proxcgal.core.progress import ProgressBar
 from proxcgal.core.provenance import origin
 from proxcgal.evaluation.metrics import (
     SELF_LIMIT_M,
@@ -20,11 +21,12 @@ from proxcgal.evaluation.metrics import (
     coverage_lines,
     static_summary,
     table,
-    write_json,
-    write_text,
 )
 from proxcgal.evaluation.phases import mean_distances
-from proxcgal.scenario.loading import HriScenario, Scenario
+from proxcgal.evaluation.trial_log import TrialLog
+from proxcgal.scenario.hri_scenario import HriScenario
+from proxcgal.scenario.scenario import Scenario
+from proxcgal.scenario.walkthrough_scenario import GuidedScenario
 from proxcgal.study.jobs import Job
 from proxcgal.study.runs.pictures import draw_figures, draw_motion
 from proxcgal.study.runs.result_folders import ready_folders, remove_empty
@@ -32,8 +34,7 @@ from proxcgal.study.runs.setup_check import check_setup
 from proxcgal.study.runs.simulation import simulate_all
 from proxcgal.study.trial_simulation import simulate_trial
 from proxcgal.study.workers import Pool, default_workers
-from proxcgal.trial.trial import TrialLog
-from proxcgal.trial.walkthrough.guided import GuidedScenario, off_paths
+from proxcgal.trial.walkthrough.guided_source import off_paths
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -190,5 +191,5 @@ def _draw(
         if pictures:  # first: it takes longest
             jobs.append(functools.partial(draw_motion, plan.scenario, plan.folder))
         jobs.append(functools.partial(draw_figures, plan.scenario, list(logs), plan.folder))
-    with Progress("drawing", [1.0] * len(jobs), "", quiet=quiet) as progress:
+    with ProgressBar("drawing", [1.0] * len(jobs), "", quiet=quiet) as progress:
         pool.run(jobs, progress.shares, lambda _, text: progress.finished(text))

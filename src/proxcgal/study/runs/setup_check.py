@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from proxcgal.core.progress import announce
-from proxcgal.models import Robot
-from proxcgal.scenario.loading import Scenario
+from proxcgal.models.robots import Robot
+from proxcgal.scenario.scenario import Scenario
 from proxcgal.scenario.setup import Setup
-from proxcgal.scenario.walkthrough import WalkScenario
-from proxcgal.sim.faults import FaultInjector
-from proxcgal.sim.mount_faults import require_mounts
-from proxcgal.sim.source import SimulatedSource
-from proxcgal.sim.world import World
+from proxcgal.scenario.walkthrough_scenario import WalkScenario
+from proxcgal.trial.assembly import assemble
 from proxcgal.trial.walkthrough.setup import WalkSetup
 
 
@@ -42,12 +39,10 @@ def check_setup(
         return
     announce(f"setting up {scenario.name} (a robot's first time takes a while)", quiet=quiet)
     setup = Setup.of(scenario, robot)
-    for controller in controllers:
-        setup.make_controller(controller)
-    FaultInjector(scenario.faults, [mount.name for mount in setup.skin.mounts], scenario.seed)
-    if scenario.skin.check_mounts and not all(map(setup.uses_known_points, controllers)):
-        source = SimulatedSource(setup, World(setup.robot, setup.scene), scenario.seed)
-        checks = require_mounts(setup, source)
+    runs = [assemble(setup, controller) for controller in controllers]
+    sensed = next((run for run in runs if run.world is not None), None)
+    checks = None if sensed is None else sensed.require_mounts()
+    if checks is not None:
         announce(
             f"{scenario.name}: {checks.judged} of {len(checks.sensors)} sensors see enough of the "
             "arm itself for their mounts to be judged; none is wrong",

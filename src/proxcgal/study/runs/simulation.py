@@ -5,10 +5,10 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 
-from proxcgal.core.progress import Progress
+from proxcgal.core.progress import ProgressBar
+from proxcgal.evaluation.trial_log import TrialLog
 from proxcgal.study.jobs import Job
 from proxcgal.study.workers import Pool
-from proxcgal.trial.trial import TrialLog
 
 
 def simulate_all(
@@ -28,7 +28,7 @@ def simulate_all(
         line: what a log file of the progress says of an ended trial, by its row.
         quiet: no progress on stderr.
     """
-    with Progress("simulating", seconds, "s", quiet=quiet) as progress:
+    with ProgressBar("simulating", seconds, "s", quiet=quiet) as progress:
         logs: list[TrialLog] = pool.run(
             jobs, progress.shares, lambda row, log: progress.finished(line(row, log))
         )

@@ -5,18 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from proxcgal.core.progress import Progress, announce
+from proxcgal.core.files import write_bytes, write_json, write_text
+from proxcgal.core.progress import ProgressBar, announce
 from proxcgal.core.provenance import origin
-from proxcgal.evaluation.metrics import aligned, write_bytes, write_json, write_text
-from proxcgal.scenario.walkthrough import WalkScenario
+from proxcgal.core.tables import aligned
+from proxcgal.scenario.walkthrough_scenario import WalkScenario
 from proxcgal.study.plotting import png
 from proxcgal.study.runs.result_folders import ready_folders, remove_empty
 from proxcgal.study.walkthrough.figures import ratings_figure, teach_figure, trip_figure
 from proxcgal.study.walkthrough.ratings import read_ratings
 from proxcgal.trial.walkthrough.run import WalkResult, run_walk
 from proxcgal.trial.walkthrough.setup import WalkSetup
-from proxcgal.trial.walkthrough.taught import to_csv, to_trajectory
-from proxcgal.trial.walkthrough.teach import REACHED, check_duration
+from proxcgal.trial.walkthrough.taught_path import to_csv, to_trajectory
+from proxcgal.trial.walkthrough.teaching import REACHED, check_duration
 
 RECORDING, FIGURE, TABLE, TRAJECTORY = "taught.mcap", "walkthrough.png", "path.csv", "path.json"
 RATINGS = "ratings.png"
@@ -41,13 +42,13 @@ def run_walkthrough(scenario: WalkScenario, folder: Path, command: str, *, quiet
     announce(f"setting up {scenario.name}", quiet=quiet)
     setup = WalkSetup.of(scenario)
     check_duration(scenario)  # before the files of an older run are removed
-    guard = setup.told()
+    guard = setup.notes()
     print("\n".join(guard))
     made = ready_folders([folder])
     for name in (RECORDING, FIGURE, TABLE, TRAJECTORY, RATINGS):
         (folder / name).unlink(missing_ok=True)
     try:
-        with Progress("teaching", [1.0], "", quiet=quiet) as progress:
+        with ProgressBar("teaching", [1.0], "", quiet=quiet) as progress:
             result = run_walk(
                 setup, seed=scenario.seed, recording=folder / RECORDING,
                 on_progress=lambda share: progress.shares([share]),

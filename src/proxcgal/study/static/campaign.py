@@ -9,22 +9,17 @@ import numpy as np
 import polars as pl
 
 from proxcgal.core.errors import ConfigError
+from proxcgal.core.files import NOTHING_M, finite
 from proxcgal.core.modes import HOLD
-from proxcgal.evaluation.metrics import (
-    CONTROLLER_KEYS,
-    COVERAGE_KEYS,
-    NOTHING_M,
-    SELF_LIMIT_M,
-    Summary,
-    finite,
-)
-from proxcgal.scenario.loading import CONTROLLERS, Scenario, load_scenario
+from proxcgal.core.progress import OnProgress
+from proxcgal.evaluation.metrics import CONTROLLER_KEYS, COVERAGE_KEYS, SELF_LIMIT_M, Summary
+from proxcgal.scenario.loading import load_scenario
+from proxcgal.scenario.scenario import CONTROLLERS, Scenario
 from proxcgal.study.bootstrap import median_interval
 from proxcgal.study.campaign import Campaign, Trial
 from proxcgal.study.campaign_kind import CampaignKind, CampaignRequest
 from proxcgal.study.campaign_plan import CampaignPlan
 from proxcgal.study.campaign_store import Row
-from proxcgal.study.jobs import ShareReport
 from proxcgal.study.paired import draw_distances, pairs
 from proxcgal.study.static.draws import draw_scene
 from proxcgal.study.static.figures import figures
@@ -79,7 +74,7 @@ def plan(request: CampaignRequest) -> Campaign:
     return campaign.campaign(perform, _columns(campaign.trials[0]), redrawn=redrawn)
 
 
-def perform(trial: Trial, report: ShareReport) -> Row:
+def perform(trial: Trial, report: OnProgress) -> Row:
     """One trial's numbers, beside what was drawn for it."""
     log = simulate_trial(
         trial.scenario, trial.controller, trial.seed, report, robot_digest=trial.robot_digest,

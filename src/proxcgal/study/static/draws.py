@@ -11,11 +11,12 @@ import numpy as np
 
 from proxcgal import _core
 from proxcgal.core.errors import ConfigError
-from proxcgal.core.transforms import inverse, placed
+from proxcgal.core.transforms import inverse, placed, sine_axis
 from proxcgal.core.typing import Array
-from proxcgal.models import Robot
+from proxcgal.models.robots import Robot
 from proxcgal.models.surfaces import Surfaces
-from proxcgal.scenario.loading import Scenario, change_scenario
+from proxcgal.scenario.loading import change_scenario
+from proxcgal.scenario.scenario import Scenario
 
 # Uniform, to either side of the scene's own value. Fixed before any drawn scene was run.
 POSITION_M = 0.10  # of the panel's centre, along each axis
@@ -152,9 +153,7 @@ def _solves(robot: Robot, q: Array, goal: Array) -> bool:
     for _ in range(60):
         T_WT = robot.tool_pose(q)
         turn = goal[:3, :3] @ T_WT[:3, :3].T
-        axis = 0.5 * np.array(
-            [turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]
-        )
+        axis = sine_axis(turn)
         error = np.concatenate([goal[:3, 3] - T_WT[:3, 3], axis])
         upright = np.trace(turn) > 1.0  # else the axis vanishes at half a turn
         if np.linalg.norm(error[:3]) < REACHED_M and np.linalg.norm(axis) < REACHED_RAD and upright:

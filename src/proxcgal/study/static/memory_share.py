@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import polars as pl
 
+from proxcgal.core.files import NOTHING_M
 from proxcgal.core.typing import Array
-from proxcgal.evaluation.metrics import NOTHING_M, Summary
+from proxcgal.evaluation.metrics import Summary
 from proxcgal.study.bootstrap import ENOUGH, ratio_interval
 from proxcgal.study.paired import draw_distances
 

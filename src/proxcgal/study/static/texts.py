@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from proxcgal.evaluation.metrics import SELF_LIMIT_M, Summary, shown
+from proxcgal.core.tables import in_metres
+from proxcgal.evaluation.metrics import SELF_LIMIT_M, Summary
 from proxcgal.study.bootstrap import ENOUGH
 from proxcgal.study.listing import Listing
 from proxcgal.study.static.figures import memory_file, scene_file
@@ -70,11 +71,11 @@ def _cells(numbers: Summary) -> tuple[str, ...]:
     low, final = numbers["true_min_m"], numbers["true_final_m"]
     return (
         str(numbers["trials"]),
-        *(shown(low[key]) for key in ("median", "p5", "min")),
-        *(shown(final[key]) for key in ("median", "p5")),
+        *(in_metres(low[key]) for key in ("median", "p5", "min")),
+        *(in_metres(final[key]) for key in ("median", "p5")),
         str(numbers["violating_trials"]),
         str(numbers["unseen_trials"]),
-        shown(numbers["self_min_m"]),
+        in_metres(numbers["self_min_m"]),
     )
 
 

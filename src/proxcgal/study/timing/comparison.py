@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from proxcgal.evaluation.metrics import aligned
+from proxcgal.core.tables import aligned
 
 CYCLE_US = 66_700.0  # [us] of the sensors; the paper's worst case stays within it
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from proxcgal.core.errors import ConfigError
 from proxcgal.core.typing import Array
-from proxcgal.models import Robot, load_robot
-from proxcgal.scenario.loading import Scenario
+from proxcgal.models.robots import Robot, load_robot
+from proxcgal.scenario.scenario import Scenario
 from proxcgal.sim.static_scan import StaticScan, scan_static
 
 SCENARIOS = ("timing_ur10e", "timing_panda")

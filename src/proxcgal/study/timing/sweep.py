@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from proxcgal.core.errors import ConfigError
-from proxcgal.core.progress import Progress
+from proxcgal.core.files import as_json, write_bytes
+from proxcgal.core.progress import ProgressBar
 from proxcgal.core.provenance import machine, origin
-from proxcgal.evaluation.metrics import as_json, write_bytes
-from proxcgal.scenario.loading import Scenario
+from proxcgal.scenario.scenario import Scenario
 from proxcgal.study.plotting import png
 from proxcgal.study.runs.result_folders import ready_folders, remove_empty
 from proxcgal.study.timing.cloud_figure import cloud_figure
@@ -74,7 +74,7 @@ def _prepare(
     """All inputs, robot by robot, before anything is written: what does not fit fails early."""
     grids: list[list[Inputs]] = []
     count = len(vertices) * len(clouds)
-    with Progress("preparing", [1.0] * (len(scenarios) * count), "", quiet=quiet) as progress:
+    with ProgressBar("preparing", [1.0] * (len(scenarios) * count), "", quiet=quiet) as progress:
         for scenario in scenarios:
             grid: list[Inputs] = []
             for inputs in grid_inputs(scenario, vertices, clouds):
@@ -93,7 +93,7 @@ def _measure(grids: Sequence[Sequence[Inputs]], effort: Effort, quiet: bool) -> 
     """One cell after the other, in this process and nothing beside it."""
     everything = [inputs for grid in grids for inputs in grid]
     cells: list[TimingCell] = []
-    with Progress("measuring", [1.0] * len(everything), "", quiet=quiet) as progress:
+    with ProgressBar("measuring", [1.0] * len(everything), "", quiet=quiet) as progress:
         for row, inputs in enumerate(everything, 1):
             found = list(time_cells([inputs], effort))
             cells += found

@@ -6,21 +6,21 @@ import numpy as np
 import polars as pl
 
 from proxcgal.core.errors import ConfigError
+from proxcgal.core.progress import OnProgress
 from proxcgal.evaluation.metrics import Summary
-from proxcgal.scenario.walkthrough import WalkScenario
+from proxcgal.scenario.walkthrough_scenario import WalkScenario
 from proxcgal.study.campaign import Campaign, Trial
 from proxcgal.study.campaign_kind import CampaignKind, CampaignRequest
 from proxcgal.study.campaign_plan import CampaignPlan
 from proxcgal.study.campaign_store import Row
-from proxcgal.study.jobs import ShareReport
 from proxcgal.study.trial_simulation import robot_of
 from proxcgal.study.walkthrough.draws import BEHAVIOURS, OWN, draw_walk
 from proxcgal.study.walkthrough.stops_figure import STOPPED, figures
 from proxcgal.study.walkthrough.texts import captions, listings, verdicts
 from proxcgal.trial.walkthrough.playback import play
 from proxcgal.trial.walkthrough.setup import WalkSetup
-from proxcgal.trial.walkthrough.taught import clean
-from proxcgal.trial.walkthrough.teach import teach
+from proxcgal.trial.walkthrough.taught_path import clean_path
+from proxcgal.trial.walkthrough.teaching import teach
 
 COLUMNS = (
     "tripped", "own_function", "latency_cycles", "false_trip", "missed", "overrun", "stop_time_s",
@@ -58,7 +58,7 @@ def plan(request: CampaignRequest) -> Campaign:
     return campaign.campaign(perform, COLUMNS, redrawn=redrawn)
 
 
-def perform(trial: Trial, report: ShareReport) -> Row:
+def perform(trial: Trial, report: OnProgress) -> Row:
     """One operator: taught; where nothing tripped, cleaned and played back."""
     assert isinstance(trial.scenario, WalkScenario)
     setup = WalkSetup.of(trial.scenario, robot_of(trial.scenario, trial.robot_digest))
@@ -84,7 +84,7 @@ def perform(trial: Trial, report: ShareReport) -> Row:
     }
     if tripped is None:
         keys = setup.scenario.playback
-        path = clean(setup.robot, log.time, log.q, step=keys.step, tolerance=keys.tolerance)
+        path = clean_path(setup.robot, log.time, log.q, step=keys.step, tolerance=keys.tolerance)
         played = play(setup, path)
         row["playback_rms_m"] = float(np.sqrt((played.error_m**2).mean()))
         row["playback_max_m"] = float(played.error_m.max())

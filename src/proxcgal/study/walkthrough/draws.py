@@ -10,7 +10,7 @@ import numpy as np
 
 from proxcgal.core.errors import ConfigError
 from proxcgal.scenario.loading import load_scenario
-from proxcgal.scenario.walkthrough import WalkScenario
+from proxcgal.scenario.walkthrough_scenario import WalkScenario
 from proxcgal.study.trial_simulation import robot_of
 from proxcgal.trial.walkthrough.intended_path import IntendedPath
 from proxcgal.trial.walkthrough.setup import WalkSetup

@@ -1,7 +1,5 @@
 """The path an operator has in mind, cycle by cycle."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
@@ -9,7 +7,7 @@ from typing import Self
 import numpy as np
 
 from proxcgal.core.typing import Array
-from proxcgal.scenario.walkthrough import Leg
+from proxcgal.scenario.walkthrough_keys import LegKeys
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,7 +20,7 @@ class IntendedPath:
     spin: Array  #: (n, 3) [rad/s] its rate: the angular velocity where the axis stays
 
     @classmethod
-    def of(cls, legs: Sequence[Leg], period: float) -> Self:
+    def of(cls, legs: Sequence[LegKeys], period: float) -> Self:
         """Leg after leg, each from rest to rest."""
         here, turned = np.zeros(3), np.zeros(3)
         parts: list[Array] = [np.zeros((1, 12))]
@@ -47,7 +45,7 @@ class IntendedPath:
         return len(self.position)
 
 
-def _profile(way: float, angle: float, leg: Leg, period: float) -> tuple[Array, Array]:
+def _profile(way: float, angle: float, leg: LegKeys, period: float) -> tuple[Array, Array]:
     """Share of the leg done, and its rate [1/s]: smooth ramps, and full speed between."""
     fastest = min(
         leg.speed / way if way > 0 else np.inf, leg.turn_speed / angle if angle > 0 else np.inf

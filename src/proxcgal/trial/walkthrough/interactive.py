@@ -1,6 +1,6 @@
-"""A walk-through cell that runs for as long as somebody watches, and pulls the tool by hand.
+"""A walk-through without end, driven by a page: a user pulls the tool by hand.
 
-Cycle by cycle the cell of every run: guard, hand guiding, weight and brakes.
+Cycle by cycle the arm of every run: guard, hand guiding, weight and brakes.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ import numpy as np
 from proxcgal import _core
 from proxcgal.core.transforms import pose
 from proxcgal.core.typing import Array
-from proxcgal.scenario.walkthrough import WalkScenario
+from proxcgal.scenario.walkthrough_scenario import WalkScenario
 from proxcgal.sim.moment import Posed
-from proxcgal.trial.walkthrough.cell import Cell
-from proxcgal.trial.walkthrough.grip import HAND, Grip
+from proxcgal.trial.walkthrough.guarded_arm import GuardedArm
+from proxcgal.trial.walkthrough.interactive_hand import HAND, InteractiveHand
 from proxcgal.trial.walkthrough.setup import PERIOD, WalkSetup
 
 CYCLES = 10  #: of the guard, in one step
@@ -62,7 +62,7 @@ class WalkMoment(Posed):
 
     state: str  #: of the guard: 'off', 'on', 'stopping'
     trips: int  #: so far
-    trip: str  #: the last one in words, "" before the first
+    trip: str  #: the last one as text, "" before the first
     violated: tuple[str, ...]  #: safety functions, in the last cycle
     overrun: bool  #: not at rest in the declared time: it can't be switched on any more
     refused: str  #: why switching on was refused last, "" where it was not
@@ -72,7 +72,7 @@ class WalkMoment(Posed):
 
 
 class WalkTrial:
-    """One cell, as `LiveTrial` is one scene. Torque is off until somebody switches it on."""
+    """One cell, as `LiveTrial` is one scene. Torque is off until a user switches it on."""
 
     def __init__(self, scenario: WalkScenario, setup: WalkSetup | None = None) -> None:
         """Args: the setup is the scenario's, where it is made already.
@@ -82,8 +82,8 @@ class WalkTrial:
             ModelError: the robot's description.
         """
         self.setup = setup or WalkSetup.of(scenario)
-        self._cell = Cell(self.setup)
-        self._grip = Grip(scenario.hand, PERIOD)
+        self._arm = GuardedArm(self.setup)
+        self._grip = InteractiveHand(scenario.hand, PERIOD)
         self._nothing = np.zeros(6)
         self._cycle = 1
         self._pressed = False
@@ -91,8 +91,8 @@ class WalkTrial:
         self._force = 0.0
         self._worst = _NOTHING
         self.cpu_us = 0.0  #: of the thread, a cycle, in the last step
-        self._out = self._cell.watch(0.0, False)
-        self._cell.move(self._nothing, False)
+        self._out = self._arm.watch(0.0, False)
+        self._arm.move(self._nothing, False)
 
     @property
     def period(self) -> float:
@@ -106,7 +106,7 @@ class WalkTrial:
 
     @property
     def stopped(self) -> bool:
-        """Has a stop taken longer than declared? Nothing that the trial is told leads out of it."""
+        """Has a stop taken longer than declared? No request of a user leads out of it."""
         return bool(self._out.overrun)
 
     def again(self) -> WalkTrial:
@@ -138,7 +138,7 @@ class WalkTrial:
 
     def moment(self) -> WalkMoment:
         """What there is to see now; the worst of the cycles since it was asked last."""
-        out, physics, robot = self._out, self._cell.physics, self.setup.robot
+        out, physics, robot = self._out, self._arm.physics, self.setup.robot
         worst, self._worst = self._worst, _NOTHING
         if worst is _NOTHING:
             worst = _NOTHING.with_cycle(out)
@@ -157,26 +157,26 @@ class WalkTrial:
 
     def operator_W(self) -> Array:  # noqa: N802  a frame's suffix
         """(4, 4) of the operator's capsule, which rides on the tool and stands upright."""
-        physics, offset = self._cell.physics, self.setup.scenario.guard.human.offset
+        physics, offset = self._arm.physics, self.setup.scenario.guard.human.offset
         return pose(tuple(physics.tool_W + physics.tool_R @ np.array(offset)))
 
     def _one(self) -> None:
-        physics, grip = self._cell.physics, self._grip
+        physics, grip = self._arm.physics, self._grip
         pressed, self._pressed = self._pressed, False
         was_on = self._out.torque
-        self._out = out = self._cell.watch(self._cycle * PERIOD, pressed)
+        self._out = out = self._arm.watch(self._cycle * PERIOD, pressed)
         self._worst = self._worst.with_cycle(out)
         if pressed:
             self._refused = self._reason() if out.reset_refused else ""
         force = self._nothing
-        if grip.holds:
+        if grip.pose is not None:
             force = grip.force(physics.tool_W, physics.tool_R, physics.tool_twist())
             if not out.torque:
                 grip.feel_stop()
         if out.torque and not was_on:
             self._refused = ""
         self._force = float(np.linalg.norm(force[:3]))
-        self._cell.move(force, grip.holds)
+        self._arm.move(force, grip.pose is not None)
         self._cycle += 1
 
     def _reason(self) -> str:
@@ -201,5 +201,5 @@ class WalkTrial:
 
     def _tool(self) -> Array:
         T_WT = np.eye(4)
-        T_WT[:3, :3], T_WT[:3, 3] = self._cell.physics.tool_R, self._cell.physics.tool_W
+        T_WT[:3, :3], T_WT[:3, 3] = self._arm.physics.tool_R, self._arm.physics.tool_W
         return T_WT

@@ -9,8 +9,8 @@ import numpy as np
 
 from proxcgal import _core
 from proxcgal.core.typing import Array, Bools
-from proxcgal.scenario.walkthrough import Guard
-from proxcgal.sim.physics import GroundTruth, Physics
+from proxcgal.scenario.walkthrough_keys import GuardKeys
+from proxcgal.sim.physics import GuardTruth, Physics
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,10 +53,10 @@ class WalkLog:
     trips: list[Trip] = field(default_factory=list)
     overrun: bool = False
     cycles: int = 0
-    left_m: float | None = None  #: of the tool from where the wished path ends; None after a trip
+    left_m: float | None = None  #: of the tool from where the intended path ends; None after a trip
 
     @classmethod
-    def empty(cls, cycles: int, joints: int, period: float, keys: Guard) -> WalkLog:
+    def empty(cls, cycles: int, joints: int, period: float, keys: GuardKeys) -> WalkLog:
         """Room for so many cycles under a guard with these keys."""
         columns: dict[str, Any] = {name: np.full(cycles, np.nan) for name in _COLUMNS}
         return cls(
@@ -72,23 +72,18 @@ class WalkLog:
         physics: Physics,
         out: _core.GuardOutput,
         force: Array | None,
-        truth: GroundTruth | None,
+        truth: GuardTruth | None,
         bounds: tuple[Array, Array],
     ) -> None:
         """One cycle more; `bounds` are qd_UB and qdd_UB, for what is true."""
         k = self.cycles
         self.time[k] = time
-        self.q[k] = physics.q
-        self.qd[k] = physics.qd
-        self.tool_W[k] = physics.tool_W
+        for name in ("q", "qd", "tool_W"):
+            getattr(self, name)[k] = getattr(physics, name)
         self.force[k] = 0.0 if force is None else np.sqrt(force[:3] @ force[:3])
-        self.tcp_speed[k] = out.tcp_speed
-        self.distance[k] = out.distance
-        self.velocity[k] = out.velocity
+        for name in (*_TRUE, "speed_ratio", "acceleration_ratio", "torque"):
+            getattr(self, name)[k] = getattr(out, name)
         self.protective_m[k] = out.protective_distance
-        self.speed_ratio[k] = out.speed_ratio
-        self.acceleration_ratio[k] = out.acceleration_ratio
-        self.torque[k] = out.torque
         self.overrun = self.overrun or out.overrun
         if out.trips > len(self.trips):
             trip = out.trip
@@ -97,9 +92,8 @@ class WalkLog:
                      limit=trip.limit)
             )  # fmt: skip
         if truth is not None:
-            self.true_tcp_speed[k] = truth.tcp_speed
-            self.true_distance[k] = truth.distance
-            self.true_velocity[k] = truth.velocity
+            for name in _TRUE:
+                getattr(self, f"true_{name}")[k] = getattr(truth, name)
             self.true_speed_ratio[k] = (np.abs(physics.qd) / bounds[0]).max()
             self.true_acceleration_ratio[k] = (np.abs(physics.acceleration) / bounds[1]).max()
         self.cycles += 1
@@ -164,7 +158,7 @@ class WalkLog:
         """Something is truly violated and nothing trips."""
         return not self.trips and bool(self.truly_violated().any())
 
-    def told_trips(self) -> list[dict[str, Any]]:
+    def trip_records(self) -> list[dict[str, Any]]:
         """Each trip's time, function, value and limit."""
         return [
             {"time_s": t.time_s, "function": t.function, "value": t.value, "limit": t.limit}
@@ -175,7 +169,7 @@ class WalkLog:
         """What experiments report."""
         stop = self.stop_time_s()
         return {
-            "trips": self.told_trips(),
+            "trips": self.trip_records(),
             "peak_after_cut_mps": self.peak_after_cut(),
             "stop_time_s": stop if stop is None or np.isfinite(stop) else None,
             "stop_distance_m": self.stop_distance_m(),
@@ -185,6 +179,7 @@ class WalkLog:
 
 
 _ROUNDING = 1e-9
+_TRUE = ("tcp_speed", "distance", "velocity")  # what the simulator is asked too
 _COLUMNS = (
     "time", "force", "tcp_speed", "distance", "velocity", "protective_m", "speed_ratio",
     "acceleration_ratio", "true_tcp_speed", "true_distance", "true_velocity",

@@ -1,7 +1,5 @@
 """Playing back what was taught: to its start, a check that it is there, then the path, guarded."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -9,10 +7,11 @@ import numpy as np
 
 from proxcgal.core.errors import ConfigError
 from proxcgal.core.typing import Array
-from proxcgal.models import Robot
+from proxcgal.models.robots import Robot
+from proxcgal.trial.walkthrough.guarded_arm import GuardedArm
 from proxcgal.trial.walkthrough.log import WalkLog
 from proxcgal.trial.walkthrough.setup import PERIOD, WalkSetup
-from proxcgal.trial.walkthrough.taught import TaughtPath, needed_scale, tool_positions
+from proxcgal.trial.walkthrough.taught_path import TaughtPath, needed_scale, tool_positions
 
 _RESET_AT, _BEGIN = 0.01, 0.10  # [s] the button, the first motion
 _SETTLE = 0.4  # [s] at the start and at the end of the path
@@ -21,7 +20,7 @@ _PULL = 5.0  # [1/s] by which what is left to the path's first pose goes
 
 
 @dataclass(frozen=True, eq=False)
-class Played:
+class PlaybackResult:
     """One playback."""
 
     log: WalkLog
@@ -30,7 +29,7 @@ class Played:
     time_s: float  #: of the path alone
 
 
-def play(setup: WalkSetup, path: TaughtPath, q: Array | None = None) -> Played:
+def play(setup: WalkSetup, path: TaughtPath, q: Array | None = None) -> PlaybackResult:
     """Runs a taught path from wherever the arm stands; the guard is active throughout.
 
     Args:
@@ -52,14 +51,13 @@ def play(setup: WalkSetup, path: TaughtPath, q: Array | None = None) -> Played:
     path_time: Array = np.arange(run, dtype=np.float64) * PERIOD / scale
     wanted, speeds = path.at(path_time)
     speeds /= scale
-    guard, physics = setup.make_guard(), setup.make_physics(q)
+    arm = GuardedArm(setup, q)
+    physics, bounds = arm.physics, arm.bounds
     log = WalkLog.empty(start + run, setup.robot.n_q, PERIOD, setup.scenario.guard)
-    bounds = (np.array(guard.qd_bounds), np.array(guard.qdd_bounds))
     still, sent = np.zeros_like(q), q.copy()
     for k in range(start + run):
         time = k * PERIOD
-        human = physics.human_velocity() if setup.scenario.guard.subtract_human else None
-        out = guard.cycle(time, physics.q, physics.qd, time >= _RESET_AT, human)
+        out = arm.watch(time, time >= _RESET_AT)
         log.add(time, physics, out, None, None, bounds)
         if k == start and not log.trips:
             check_start(setup.robot, physics.q, path, keys.start_tolerance)
@@ -72,7 +70,7 @@ def play(setup: WalkSetup, path: TaughtPath, q: Array | None = None) -> Played:
             row = k - start
             command = speeds[row] + _PULL * (wanted[row] - sent)
         sent += PERIOD * command
-        physics.step(command, out.torque)
+        arm.drive(command)
     log.cut()
     played = log.tool_W[start : start + run]
     inside = path_time <= path.duration
@@ -80,7 +78,7 @@ def play(setup: WalkSetup, path: TaughtPath, q: Array | None = None) -> Played:
         [np.interp(path_time, path.raw_time, column) for column in path.raw_tool_W.T], axis=1
     )
     error = np.linalg.norm(played - taught, axis=1)[inside]
-    return Played(log, scale, error, scale * path.duration)
+    return PlaybackResult(log, scale, error, scale * path.duration)
 
 
 def check_start(robot: Robot, q: Array, path: TaughtPath, tolerance: float) -> None:

@@ -1,7 +1,5 @@
 """A whole walk-through: taught, recorded, cleaned, played back; stops looked at more closely."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,12 +9,17 @@ import numpy as np
 
 from proxcgal.core.errors import RecordingError
 from proxcgal.trial.walkthrough.log import WalkLog
-from proxcgal.trial.walkthrough.playback import Played, play
-from proxcgal.trial.walkthrough.poses import PoseRecorder, read_poses
+from proxcgal.trial.walkthrough.playback import PlaybackResult, play
+from proxcgal.trial.walkthrough.pose_recording import PoseRecorder, read_poses
 from proxcgal.trial.walkthrough.setup import PERIOD, WalkSetup
-from proxcgal.trial.walkthrough.stops import Stop, not_worst, stops_of, worst_stops
-from proxcgal.trial.walkthrough.taught import TaughtPath, clean
-from proxcgal.trial.walkthrough.teach import START_AT, check_duration, teach
+from proxcgal.trial.walkthrough.stopping_performance import (
+    StoppingPerformance,
+    stops_with_other_brakes,
+    worst_case_problem,
+    worst_case_stops,
+)
+from proxcgal.trial.walkthrough.taught_path import TaughtPath, clean_path
+from proxcgal.trial.walkthrough.teaching import START_AT, check_duration, teach
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,9 +28,9 @@ class WalkResult:
 
     log: WalkLog
     path: TaughtPath | None = None  #: where it was taught to the end
-    played: Played | None = None
+    played: PlaybackResult | None = None
     slow: WalkLog | None = None  #: the same path taught under the hand-guiding rules
-    stops: list[Stop] = field(default_factory=list)
+    stops: list[StoppingPerformance] = field(default_factory=list)
     stops_note: str | None = None  #: why those in the worst posture were left out
 
     def summary(self) -> dict[str, Any]:
@@ -40,7 +43,7 @@ class WalkResult:
         }
         found["playback"] = None if played is None or self.path is None else {
             "scale": played.scale, "time_s": played.time_s,
-            "cleaned_by_m": self.path.deviation_m, "trips": played.log.told_trips(),
+            "cleaned_by_m": self.path.deviation_m, "trips": played.log.trip_records(),
         }  # fmt: skip
         found["teaching_time_s"] = None if self.path is None else self.path.duration
         found["hand_guiding"] = None if self.slow is None else {
@@ -72,7 +75,7 @@ def run_walk(
         setup: of the scenario.
         seed: fixes the operator's tremor.
         recording: gets every pose of the teaching.
-        on_progress: told the share of the teaching that is done.
+        on_progress: gets the share of the teaching that is done.
 
     Raises:
         ConfigError: what does not fit, or a recording that cannot be written.
@@ -84,13 +87,13 @@ def run_walk(
     with PoseRecorder(recording, about) as recorder:
         log = teach(setup, seed=seed, recorder=recorder, with_truth=True, on_progress=on_progress)
     if log.trips:
-        stops = stops_of(setup, seed) + worst_stops(setup)
-        return WalkResult(log, stops=stops, stops_note=not_worst(setup))
+        stops = stops_with_other_brakes(setup, seed) + worst_case_stops(setup)
+        return WalkResult(log, stops=stops, stops_note=worst_case_problem(setup))
     if recorder.failure is not None:
         raise RecordingError(f"{recorder.failure}; what it holds is not the whole path")
     poses = read_poses(recording)
     keys = setup.scenario.playback
-    path = clean(setup.robot, poses.time, poses.q, step=keys.step, tolerance=keys.tolerance)
+    path = clean_path(setup.robot, poses.time, poses.q, step=keys.step, tolerance=keys.tolerance)
     slow = teach(setup.slow(), seed=seed)
     return WalkResult(log, path, play(setup, path), slow)
 

@@ -12,11 +12,11 @@ import numpy as np
 from proxcgal import _core
 from proxcgal.core.errors import ConfigError
 from proxcgal.core.typing import Array
-from proxcgal.models import Robot, load_robot
 from proxcgal.models.builtin import ga_ol
 from proxcgal.models.formats.capsule_robot import CapsuleRobot, read_capsule_robot
-from proxcgal.scenario.walkthrough import WalkScenario
-from proxcgal.sim.physics import OperatorShape, Physics
+from proxcgal.models.robots import Robot, load_robot
+from proxcgal.scenario.walkthrough_scenario import WalkScenario
+from proxcgal.sim.physics import Physics
 
 PERIOD = 0.001  #: [s] of the guard's, the guiding's and the physics' cycle, [WT] section 3
 
@@ -53,7 +53,7 @@ class WalkSetup:
         setup = cls(scenario, robot, arm, q0)
         setup.make_guard()
         setup.make_guide()
-        setup.make_physics()  # what it lacks is told before anything is written
+        setup.make_physics()  # fails before anything is written
         return setup
 
     def make_guard(self) -> _core.Guard:
@@ -77,11 +77,10 @@ class WalkSetup:
 
     def make_physics(self, q: Array | None = None) -> Physics:
         """The arm with its weight and brakes, at rest."""
-        keys, human = self.scenario.arm, self.scenario.guard.human
+        keys = self.scenario.arm
         return Physics(
             self.arm, self.q0 if q is None else q, period=PERIOD, payload=keys.payload,
-            brake_scale=keys.brake_scale,
-            human=OperatorShape(radius=human.radius, height=human.height, offset=human.offset),
+            brake_scale=keys.brake_scale, human=self.scenario.guard.human,
         )  # fmt: skip
 
     @cached_property
@@ -112,8 +111,8 @@ class WalkSetup:
         guard = slow.guard.model_copy(update={"accept": accept})
         return WalkSetup.of(slow.model_copy(update={"guard": guard}), self.robot)
 
-    def told(self) -> list[str]:
-        """What a user must see at the start: monitored pairs, what was accepted, both distances."""
+    def notes(self) -> list[str]:
+        """Lines for a user at the start: monitored pairs, what was accepted, both distances."""
         guard, keys = self.bounds, self.scenario.guard
         return [
             f"guard: distance to the operator: {', '.join(guard.monitored_pairs)}; "

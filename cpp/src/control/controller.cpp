@@ -1,0 +1,293 @@
+#include "proxcgal/control/controller.hpp"
+
+#include <cmath>
+
+#include "approach_limits.hpp"
+#include "avoidance_execution.hpp"
+#include "control_points.hpp"
+#include "obstacle_velocities.hpp"
+#include "perception/monotonic_clock.hpp"
+#include "perception/perception.hpp"
+#include "perception/stopwatch.hpp"
+#include "proxcgal/error.hpp"
+#include "task_stack.hpp"
+#include "tick_history.hpp"
+#include "trusted_distance.hpp"
+
+namespace proxcgal {
+namespace {
+
+constexpr double kRigid = 1e-6;          // how far a goal's rotation may be from orthonormal
+constexpr double kSpeedRounding = 1e-9;  // [rad/s] or [m/s]
+
+bool is_rigid(const Pose& T) {
+  return T.matrix().allFinite() &&
+         (T.linear() * T.linear().transpose() - Eigen::Matrix3d::Identity()).norm() < kRigid &&
+         T.linear().determinant() > 0.0;
+}
+
+}  // namespace
+
+struct Controller::Impl {
+  std::shared_ptr<const Robot> robot;
+  Skin skin;
+  ControllerConfig config;
+  Monitor monitor;
+  detail::Perception perception;
+  detail::ControlPoints control_points;
+  detail::TaskStack stack;
+  detail::TrustedDistance trusted;
+  detail::ApproachLimits approach_limits;
+  detail::AvoidanceExecution execution;
+  Limits limits;
+  detail::MonotonicClock clock;
+
+  detail::TickHistory history;
+  bool mounts_accepted;
+
+  JointVector qd_last;
+  Posture posture;
+  const Points none_W = Points(0, 3);
+  Points estimate_W = Points::Zero(1, 3);  // velocity of the closest obstacle [m/s]
+  Solution solution;
+  TickOutput out;
+
+  Impl(std::shared_ptr<const Robot> r, Skin s, ControllerConfig c)
+      : robot(std::move(r)),
+        skin(std::move(s)),
+        config(std::move(c)),
+        monitor(config.monitor),
+        perception(robot, skin,
+                   {config.filter, config.monitor, config.method, config.memory, config.motion,
+                    config.timings}),
+        control_points(*robot, skin, config),
+        stack(*robot, skin, config),
+        trusted(*robot, config),
+        approach_limits(*robot, skin, config),
+        execution(config),
+        limits{robot->q_min(), robot->q_max(), robot->qd_max(), robot->qdd_max()},
+        clock(config.period),
+        mounts_accepted(!config.monitor.await_mounts),
+        posture(robot->make_posture()) {
+    if (!limits.qd_max.allFinite() || !limits.qdd_max.allFinite()) {
+      throw ConfigError("robot '" + robot->spec().name +
+                        "' has a joint without a speed or acceleration limit: give both");
+    }
+    qd_last = JointVector::Zero(robot->n_q());
+    out.qd = qd_last;
+    out.n_tasks = static_cast<int>(config.tasks.size());
+  }
+
+  void note(Reason reason, int link = -1) { monitor.add({.reason = reason, .link = link}); }
+
+  /// An age that is not a number, or below nothing, says that the stamp is of another clock.
+  void judge_age(double age) {
+    const bool known = age >= -kClockResolution;  // so that what is not a number is unknown
+    if (known && age <= config.monitor.joints_hold_after) return;
+    const bool lost = known && age > config.monitor.joints_stop_after;
+    monitor.add({.reason = lost ? Reason::kJointStateLost : Reason::kJointStateStale, .age = age});
+  }
+
+  /// Joint state and goal are usable; else the reason is noted.
+  bool usable(double time, const JointVector& q, std::optional<double> q_stamp, const Pose& goal) {
+    const bool joints = q.size() == robot->n_q() && q.allFinite();
+    if (!joints) note(Reason::kJointStateInvalid);
+    if (q_stamp) judge_age(time - *q_stamp);
+    const bool rigid = is_rigid(goal);
+    if (!rigid) note(Reason::kGoalInvalid);
+    return joints && rigid;
+  }
+
+  /// The limits of a nominal period, with no more change of velocity than the time since the last
+  /// command allows: a tick may come early. Braking in time stays possible: until the next command
+  /// the joint moves at this one for a nominal period at most.
+  Admissible admissible_now(const JointVector& q, double scale) const {
+    Admissible box = admissible(limits, q, qd_last, config.period, scale);
+    const JointVector change = clock.step() * limits.qdd_max;
+    box.low = box.steady_low.cwiseMax(qd_last - change).cwiseMin(qd_last + change);
+    box.high = box.steady_high.cwiseMax(qd_last - change).cwiseMin(qd_last + change);
+    return box;
+  }
+
+  /// From the joint state and a cloud to an admissible velocity.
+  /// @param sensed  the cloud is the sensors', row by row; else it is known
+  void act(const JointVector& q, const PointsRef& cloud_W, bool sensed,
+           const detail::ObstacleVelocities& velocities, const Pose& goal) {
+    detail::Stopwatch watch(config.timings);
+    out.pair = control_points.nearest(clock.now(), *robot, posture, cloud_W, trusted.d_min(),
+                                      stack.engaged_within(), monitor);
+    if (sensed) {
+      trusted.of_sensed(clock.now(), posture, perception, control_points, out, monitor);
+    } else {
+      trusted.of_known(posture, out);
+    }
+    if (out.pair) out.obstacle_velocity_W = velocities.of(out.pair->point);
+    if (out.pair && sensed && config.motion) {
+      const Vector3& obstacle_W = out.pair->obstacle_W;
+      out.obstacle_velocity_W = perception.velocity_W(clock.now(), obstacle_W);
+      estimate_W.row(0) = out.obstacle_velocity_W.transpose();
+      const PointsRef moving_W(estimate_W);
+      const detail::ObstacleVelocities estimated(moving_W, cloud_W, obstacle_W,
+                                                 config.motion->radius);
+      stack.build(posture, cloud_W, estimated, goal, control_points, trusted, out, monitor);
+    } else {
+      stack.build(posture, cloud_W, velocities, goal, control_points, trusted, out, monitor);
+    }
+    out.timings.distance_us = watch.lap_us();
+    solve(stack.tasks(), robot->n_q(), limits.qd_max, config.solver, solution);
+    // By the last tick's mode: this one's findings are not complete yet.
+    const double scale = monitor.slowed() ? config.monitor.degraded_scale : 1.0;
+    const Admissible box = admissible_now(q, scale);
+    const std::span<const JointVector> levels(solution.rho.data(),
+                                              static_cast<std::size_t>(solution.levels) + 1);
+    command(levels, stack.tasks(), qd_last, box, out.qd);
+    stack.catch_up(levels, box, out.qd);
+    // What is known to be there has the last word over what may be where nothing is seen.
+    const JointVector solved = out.qd;
+    if (sensed)
+      approach_limits.slow_into_unseen(clock.now(), posture, perception, box, out, monitor);
+    const bool cut_back = (out.qd.array() != solved.array()).any();
+    approach_limits.keep_off(posture, trusted, box, out);
+    out.timings.solve_us = watch.lap_us();
+    execution.judge(clock.now(), stack, {levels, qd_last, box, cut_back}, trusted, out, monitor);
+    if ((q.array() < limits.q_min.array() || q.array() > limits.q_max.array()).any())
+      note(Reason::kOutsideLimits);
+  }
+
+  /// Who saw the pair's obstacle point, and when.
+  void blame() {
+    if (!out.pair) return;
+    const Eigen::Index row = out.pair->point;
+    out.pair_origin = perception.origins()[static_cast<std::size_t>(row)];
+    out.pair_age = clock.now() - perception.stamp(row);
+    out.pair_remembered = row >= perception.seen_points();
+  }
+
+  /// The mode that this tick's findings call for; HOLD and STOP brake instead of what was solved.
+  void conclude(const JointVector& q, bool usable) {
+    out.mode = monitor.conclude();
+    if (!usable || out.mode >= Mode::kHold) {
+      const JointVector& at = usable ? q : posture.q;  // the last posture that could be trusted
+      const Admissible box = admissible_now(at, 1.0);
+      decelerate(qd_last, box, out.qd);
+      if (usable) approach_limits.keep_off(posture, trusted, box, out);
+    }
+    qd_last = out.qd;
+    if (usable) stack.report(out);
+    history.add(clock.caller(), q, robot->n_q(), out, monitor.findings());
+  }
+
+  void begin(double time, bool late) {
+    monitor.begin();
+    monitor.deadline(late);
+    if (!clock.advance(time)) note(Reason::kTimeInvalid);
+    out.pair.reset();
+    out.pair_origin = {};
+    out.pair_age = 0.0;
+    out.pair_remembered = false;
+    out.obstacle_velocity_W.setZero();
+    out.trusted_distance = kInfinity;
+    out.control = {};
+    out.own = {};
+    out.timings = {};
+    for (int level = 0; level < out.n_tasks; ++level)
+      out.tasks[static_cast<std::size_t>(level)] = {};
+  }
+};
+
+Controller::Controller(std::shared_ptr<const Robot> robot, Skin skin, ControllerConfig config) {
+  config.validate();
+  impl_ = std::make_unique<Impl>(std::move(robot), std::move(skin), std::move(config));
+}
+Controller::~Controller() = default;
+
+const TickOutput& Controller::tick(double time, const JointVector& q, std::span<const Scan> scans,
+                                   const Pose& goal, bool late, std::optional<double> q_stamp) {
+  Impl& me = *impl_;
+  detail::Stopwatch watch(me.config.timings);
+  me.begin(time, late);
+  if (!me.mounts_accepted) me.note(Reason::kMountsUnchecked);
+  const bool usable = me.usable(time, q, q_stamp, goal);
+  if (usable) {
+    me.perception.update(me.clock.now(), me.clock.delay(), q, scans, me.monitor);
+    me.out.timings.sense_us = me.perception.sense_us;
+    me.out.timings.filter_us = me.perception.filter_us;
+    me.perception.freshness().check(me.clock.now(), me.monitor);
+    me.robot->update(q, me.posture);
+    me.perception.remember(me.clock.now(), me.posture, me.monitor);
+    me.out.timings.memory_us = me.perception.memory_us;
+    me.act(q, me.perception.cloud_W(), true, detail::ObstacleVelocities(me.none_W), goal);
+    me.blame();
+    me.trusted.watch(me.clock.now(), me.out, me.perception);
+  }
+  me.conclude(q, usable);
+  me.out.timings.total_us = watch.lap_us();
+  return me.out;
+}
+
+const TickOutput& Controller::tick_known(double time, const JointVector& q,
+                                         const PointsRef& points_W, const Pose& goal,
+                                         const PointsRef& velocities_W) {
+  Impl& me = *impl_;
+  detail::Stopwatch watch(me.config.timings);
+  me.begin(time, false);
+  bool usable = me.usable(time, q, std::nullopt, goal);
+  const Eigen::Index rows = velocities_W.rows();
+  if (points_W.rows() > me.config.max_points || !points_W.allFinite() ||
+      (rows > 1 && rows != points_W.rows()) || !velocities_W.allFinite() ||
+      (points_W.size() > 0 && points_W.cwiseAbs().maxCoeff() > kFarthest)) {
+    me.note(Reason::kPointsInvalid);
+    usable = false;
+  }
+  if (usable) me.robot->update(q, me.posture);
+  if (usable) me.act(q, points_W, false, detail::ObstacleVelocities(velocities_W), goal);
+  me.conclude(q, usable);
+  me.out.timings.total_us = watch.lap_us();
+  return me.out;
+}
+
+std::span<const Finding> Controller::findings() const { return impl_->monitor.findings(); }
+Eigen::Map<const Points> Controller::cloud_W() const { return impl_->perception.cloud_W(); }
+std::span<const PointOrigin> Controller::cloud_origins() const {
+  return impl_->perception.origins();
+}
+Eigen::Map<const Points> Controller::raw_cloud_W() const { return impl_->perception.raw_cloud_W(); }
+Eigen::Index Controller::seen_points() const { return impl_->perception.seen_points(); }
+std::vector<double> Controller::cloud_ages(double time) const {
+  std::vector<double> ages(impl_->perception.origins().size());
+  const double now = time + impl_->clock.delay();
+  for (std::size_t row = 0; row < ages.size(); ++row)
+    ages[row] = now - impl_->perception.stamp(static_cast<Eigen::Index>(row));
+  return ages;
+}
+std::vector<double> Controller::scan_ages(double time) const {
+  std::vector<double> ages(impl_->skin.mounts.size());
+  const double now = time + impl_->clock.delay();
+  for (std::size_t s = 0; s < ages.size(); ++s) ages[s] = impl_->perception.freshness().age(s, now);
+  return ages;
+}
+const Robot& Controller::robot() const { return *impl_->robot; }
+const Skin& Controller::skin() const { return impl_->skin; }
+const ControllerConfig& Controller::config() const { return impl_->config; }
+std::vector<TickRecord> Controller::last_ticks() const { return impl_->history.records(); }
+void Controller::accept_mounts() { impl_->mounts_accepted = true; }
+bool Controller::reset() {
+  const bool left = impl_->monitor.reset();
+  if (left) impl_->history.go_on();
+  return left;
+}
+void Controller::retune(const std::vector<TaskSpec>& tasks) {
+  impl_->config.tasks = detail::retuned(impl_->config, tasks, *impl_->robot).tasks;
+  impl_->trusted.retune(tasks);
+}
+void Controller::go_on_from(const JointVector& qd) {
+  const JointVector& most = impl_->limits.qd_max;
+  const bool fits = qd.size() == most.size() && qd.allFinite() &&
+                    (qd.cwiseAbs().array() <= most.array() + kSpeedRounding).all();
+  require(fits, "qd", qd.transpose(),
+          std::to_string(most.size()) + " finite numbers within the joints' speed limits");
+  impl_->qd_last = qd;
+  impl_->out.qd = qd;
+}
+
+}  // namespace proxcgal

@@ -1,0 +1,70 @@
+#include "proxcgal/guiding/hand_guide.hpp"
+
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "proxcgal/error.hpp"
+
+namespace proxcgal {
+namespace {
+
+constexpr double kHeldBack =
+    1e-9;  ///< [m/s], [rad/s] a smaller difference is the solver's rounding
+
+void require_limits(const JointVector& values, Eigen::Index n, const char* field) {
+  if (values.size() == 0) return;
+  require(values.size() == n && !values.hasNaN() && values.minCoeff() > 0.0, field,
+          values.transpose(), std::to_string(n) + " numbers above 0, one a joint");
+}
+
+}  // namespace
+
+void HandGuideConfig::validate(const Robot& robot) const {
+  admittance.validate();
+  solver.validate();
+  require_limits(qd_max, robot.n_q(), "qd_max");
+  require_limits(qdd_max, robot.n_q(), "qdd_max");
+  require(std::isfinite(period) && period > 0.0 && period <= 0.1, "period", period,
+          "above 0 and at most 0.1 s");
+}
+
+HandGuide::HandGuide(std::shared_ptr<const Robot> robot, HandGuideConfig config)
+    : robot_(std::move(robot)),
+      config_((config.validate(*robot_), std::move(config))),
+      admittance_(config_.admittance),
+      limits_{robot_->q_min(), robot_->q_max(),
+              config_.qd_max.size() > 0 ? config_.qd_max : robot_->qd_max(),
+              config_.qdd_max.size() > 0 ? config_.qdd_max : robot_->qdd_max()},
+      posture_(robot_->make_posture()) {
+  task_.activation.setOnes(6);
+  output_.qd.setZero(robot_->n_q());
+}
+
+const HandGuideOutput& HandGuide::step(const JointVector& q, const Vector6& force, bool engaged) {
+  robot_->update(q, posture_);
+  Jacobian6 J;
+  robot_->tool_jacobian(posture_, J);
+  output_.T_WT = posture_.T_WT;
+  output_.wanted = admittance_.step(force, engaged, config_.period);
+  task_.jacobian = J;
+  task_.rate = output_.wanted;
+  solve({&task_, 1}, robot_->n_q(), limits_.qd_max, config_.solver, solution_);
+  const Admissible box = admissible(limits_, q, output_.qd, config_.period);
+  const JointVector last = output_.qd;
+  command({solution_.rho.data(), static_cast<std::size_t>(solution_.levels) + 1}, {&task_, 1}, last,
+          box, output_.qd);
+  output_.achieved = J * output_.qd;
+  if ((output_.achieved - output_.wanted).cwiseAbs().maxCoeff() > kHeldBack)
+    admittance_.held_to(output_.achieved);
+  return output_;
+}
+
+void HandGuide::halt() {
+  admittance_.stop();
+  output_.qd.setZero();
+  output_.wanted.setZero();
+  output_.achieved.setZero();
+}
+
+}  // namespace proxcgal
