@@ -16,9 +16,10 @@ from proxcgal.scenario.keys import Obstacle, Sensor, Simulation
 from proxcgal.scenario.loading import load_scenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.scene.obstacles import ObstacleScene
+from proxcgal.sim.picture import Arrow, Camera, Spheres
 from proxcgal.sim.range_sensor import NO_TARGET, VALID, RangeModel
 from proxcgal.sim.source import SimulatedSource
-from proxcgal.sim.world import Arrow, Camera, Spheres, World, mujoco
+from proxcgal.sim.world import World, mujoco
 
 Array = NDArray[np.float64]
 
