@@ -16,7 +16,8 @@ from proxcgal.recording.render import RecordedMoment, draw, recorded_moments, wr
 from proxcgal.scenario.hri_scenario import HriScenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.scene.solids import Box
-from proxcgal.sim.world import Camera, World
+from proxcgal.sim.picture import Camera
+from proxcgal.sim.world import World
 from proxcgal.study.figures import COLOURS, GREY, NAMES
 
 FPS = 8.0
