@@ -18,9 +18,10 @@ from proxcgal.scenario.simulation_keys import SimulationKeys
 from proxcgal.scenario.skin_keys import SensorKeys
 from proxcgal.scene.obstacle_keys import Obstacle
 from proxcgal.scene.obstacles import ObstacleScene
+from proxcgal.sim.picture import Arrow, Camera, Spheres
 from proxcgal.sim.range_sensor import NO_TARGET, VALID, RangeModel
 from proxcgal.sim.source import SimulatedSource
-from proxcgal.sim.world import Arrow, Camera, Spheres, World, mujoco
+from proxcgal.sim.world import World, mujoco
 
 Array = NDArray[np.float64]
 

@@ -14,8 +14,6 @@ import numpy as np
 import pytest
 from mcap.writer import Writer
 from PIL import Image
-from proxcgal.study.runs.simulation import warn_of_stopped
-from proxcgal.study.trial_simulation import simulate_trial
 
 import proxcgal as px
 from proxcgal.evaluation.trial_log import TrialLog, final_ticks
@@ -31,6 +29,8 @@ from proxcgal.sim.range_sensor import NO_TARGET, VALID
 from proxcgal.sim.tick import TickInput
 from proxcgal.sim.world import World
 from proxcgal.study.campaign_picture import _draw
+from proxcgal.study.runs.simulation import warn_of_stopped
+from proxcgal.study.trial_simulation import simulate_trial
 from proxcgal.trial.trial import run_trial
 
 SHORT = ["duration=1.0"]

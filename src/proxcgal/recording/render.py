@@ -13,8 +13,9 @@ from proxcgal.core.typing import Array
 from proxcgal.recording.reader import Recording
 from proxcgal.recording.replay import Replay
 from proxcgal.sim.clouds import Clouds
+from proxcgal.sim.picture import Arrow, Camera, Color, Spheres
 from proxcgal.sim.tick import Tick
-from proxcgal.sim.world import Arrow, Camera, Color, Spheres, World
+from proxcgal.sim.world import World
 
 Picture = NDArray[np.uint8]
 
@@ -50,10 +51,8 @@ def recorded_moments(
     rows = np.searchsorted([tick.inputs.time for tick in recording.ticks], times)
     wanted = np.minimum(rows, len(recording.ticks) - 1).tolist()
     elapsed, postures = _elapsed(recording), list(recording.postures())
-    taken = {}
-    for row, tick, clouds in _with_clouds(recording, controller, wanted):
-        taken[row] = RecordedMoment(tick, clouds, float(elapsed[row]), postures[row])
-    return [taken[row] for row in wanted]
+    shown = _shown(recording, controller, wanted)
+    return [RecordedMoment(*shown[row], float(elapsed[row]), postures[row]) for row in wanted]
 
 
 def _elapsed(recording: Recording) -> Array:
@@ -64,22 +63,16 @@ def _elapsed(recording: Recording) -> Array:
     return np.arange(len(recording.ticks), dtype=np.float64) * (1.0 / hz)
 
 
-def _with_clouds(
+def _shown(
     recording: Recording, controller: str | None, rows: Sequence[int]
-) -> Iterator[tuple[int, Tick, Clouds]]:
+) -> dict[int, tuple[Tick, Clouds]]:
     """The ticks of these rows, as recorded, or computed again where the clouds are not recorded."""
     if controller is None and recording.has_clouds:
-        for row in rows:
-            clouds = recording.clouds(row)
-            assert clouds is not None
-            yield row, recording.ticks[row], clouds
-        return
+        recorded = {row: (recording.ticks[row], recording.clouds(row)) for row in rows}
+        return {row: (tick, clouds) for row, (tick, clouds) in recorded.items() if clouds}
     replay = Replay(recording, controller)
-    for row, tick in enumerate(replay):
-        if row in rows:
-            yield row, tick, Clouds.of(replay.ctrl)
-        if row >= max(rows, default=-1):
-            return
+    repeated = zip(range(max(rows, default=-1) + 1), replay, strict=False)
+    return {row: (tick, Clouds.of(replay.ctrl)) for row, tick in repeated if row in rows}
 
 
 def draw(

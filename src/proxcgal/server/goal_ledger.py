@@ -42,7 +42,8 @@ class GoalLedger(Generic[P]):
         """Nothing is pursued."""
         self.active: P | None = None  #: the one that is pursued
         self._count = 0
-        self._braking: Braking | None = None
+        self._cancelled, self._qdd_max = 0.0, np.empty(0)  # when [s], and what the arm brakes with
+        self._qd: Array | None = None  # of the tick before, while the arm brakes
         self._results: OrderedDict[int, GoalResult] = OrderedDict()
 
     @property
@@ -66,13 +67,36 @@ class GoalLedger(Generic[P]):
         active = self.active
         if active is None or active.number != number or active.state == "cancelling":
             return False
-        active.state, self._braking = "cancelling", Braking(time, qdd_max)
+        active.state, self._qd = "cancelling", None
+        self._cancelled, self._qdd_max = time, qdd_max
         return True
 
     def braked(self, time: float, passed: float, result: TickResult | None) -> str | None:
-        """Why the cancelled goal ends with this tick; None: the arm brakes still."""
-        assert self._braking is not None
-        return self._braking(time, passed, result)
+        """Why the cancelled goal ends with this tick; None: the arm brakes still.
+
+        It ends at rest, or at what the tasks above reaching still ask for. A command changes as
+        fast as the acceleration limits allow until it is what those ask for: where no joint is at
+        its limit any more, what still moves the arm is theirs.
+
+        Args:
+            time: of the tick [s].
+            passed: since the tick before [s].
+            result: of the tick; None where there was none.
+        """
+        if (
+            result is None
+            or np.abs(result.qd).max() <= AT_REST
+            or time - self._cancelled > STOPPED_AFTER
+        ):
+            return CANCELLED
+        before, self._qd = self._qd, result.qd
+        if before is None:
+            return None
+        share = np.abs(result.qd - before) / (self._qdd_max * max(passed, 1e-9))
+        moving = _above_reaching(result)
+        if not moving or share.max() >= _AT_BOUND:
+            return None
+        return f"{CANCELLED}; {', '.join(moving)} still moves the arm"
 
     def end(self, outcome: Outcome, reason: str, time: float, errors: tuple[float, float]) -> None:
         """The one place where a goal ends.
@@ -92,41 +116,6 @@ class GoalLedger(Generic[P]):
         while len(self._results) > KEPT_RESULTS:
             self._results.popitem(last=False)
         self.active = None
-
-
-class Braking:
-    """From a cancel to its end: at rest, or at what the tasks above reaching still ask for."""
-
-    def __init__(self, begun: float, qdd_max: Array) -> None:
-        """Args: when [s], and what the arm brakes with (n_q,)."""
-        self._begun, self._qdd_max = begun, qdd_max
-        self._qd: Array | None = None
-
-    def __call__(self, time: float, passed: float, result: TickResult | None) -> str | None:
-        """Why it is over after this tick; None: it is not.
-
-        A command changes as fast as the acceleration limits let it until it is what the tasks ask
-        for: where no joint is at its limit any more, what still moves the arm is theirs.
-
-        Args:
-            time: of the tick [s].
-            passed: since the tick before [s].
-            result: of the tick; None where there was none.
-        """
-        if (
-            result is None
-            or np.abs(result.qd).max() <= AT_REST
-            or time - self._begun > STOPPED_AFTER
-        ):
-            return CANCELLED
-        before, self._qd = self._qd, result.qd
-        if before is None:
-            return None
-        share = np.abs(result.qd - before) / (self._qdd_max * max(passed, 1e-9))
-        moving = _above_reaching(result)
-        if not moving or share.max() >= _AT_BOUND:
-            return None
-        return f"{CANCELLED}; {', '.join(moving)} still moves the arm"
 
 
 def _above_reaching(result: TickResult) -> list[str]:

@@ -1,8 +1,7 @@
 """An arm with weight, drives and brakes: MuJoCo steps it, so that a stop is simulated, not assumed.
 
-Beside `world` the only module that imports MuJoCo. The drives follow velocity commands by computed
-torque, with a model that is a little wrong; once the torque is off, brakes close as dry friction in
-the joints, after the time that theirs take.
+The drives follow velocity commands by computed torque, with a model that is a little wrong; once
+the torque is off, brakes close as dry friction in the joints, after the time that theirs take.
 """
 
 import math

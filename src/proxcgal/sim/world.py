@@ -3,20 +3,18 @@
 MuJoCo casts the rays at the scene; at the robot's own links, with their tens of thousands of faces,
 our trees cast them four times faster, with the same hits (tested).
 
-Beside `physics` the only module that imports MuJoCo. Nothing is stepped: the arm follows its
+Nothing is stepped: the arm follows its
 velocity commands exactly and the scene its paths, so poses are set, and rays and pictures are taken
 at them.
 """
 
 import copy
-import ctypes
-import os
-import sys
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 from weakref import WeakKeyDictionary
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,29 +24,10 @@ from proxcgal.models.robots import Robot
 from proxcgal.models.surfaces import Surfaces
 from proxcgal.scene.obstacles import Scene
 from proxcgal.scene.solids import Box, CapsuleSolid, Cylinder, Solid, Sphere
+from proxcgal.sim.picture import Arrow, Camera, Pictures, Spheres, furnish
 
-
-def _off_screen_library() -> str:
-    """What to draw with where there is no display; "disable" where nothing can."""
-    for backend, library in (("egl", "libEGL.so.1"), ("osmesa", "libOSMesa.so.8")):
-        try:
-            ctypes.CDLL(library)
-        except OSError:
-            continue
-        return backend
-    return "disable"
-
-
-if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("MUJOCO_GL")):
-    os.environ["MUJOCO_GL"] = _off_screen_library()  # read once, by the import
-
-_TOO_LATE = "mujoco" in sys.modules
-import mujoco  # noqa: E402
-
-Color = tuple[float, float, float, float]
-
-#: Groups: the scene that MuJoCo casts rays at; the links; the floor, which is in no cloud.
-_SCENE, _LINKS, _FLOOR = 0, 1, 2
+#: Groups: the scene that MuJoCo casts rays at; the links, beside the floor of `picture`.
+_SCENE, _LINKS = 0, 1
 _CAST_GROUP = np.array([1, 0, 0, 0, 0, 0], np.uint8)
 _GEOMS: dict[type[Solid], Any] = {
     Box: mujoco.mjtGeom.mjGEOM_BOX,
@@ -59,35 +38,6 @@ _GEOMS: dict[type[Solid], Any] = {
 _LINK_COLORS = ((0.83, 0.84, 0.86, 1.0), (0.45, 0.62, 0.76, 1.0))
 _OBSTACLE_COLOR = (0.98, 0.72, 0.35, 0.4)
 _UNSENSED_COLOR = (0.62, 0.64, 0.67, 0.35)
-
-
-@dataclass(frozen=True, slots=True)
-class Spheres:
-    """Points to draw."""
-
-    centers_W: Array  #: (n, 3) [m]
-    radius: float  #: [m]
-    color: Color
-
-
-@dataclass(frozen=True, slots=True)
-class Arrow:
-    """An arrow to draw."""
-
-    tail_W: Array  #: (3,) [m]
-    tip_W: Array  #: (3,) [m]
-    width: float  #: [m]
-    color: Color
-
-
-@dataclass(frozen=True, slots=True)
-class Camera:
-    """Where a picture is taken from."""
-
-    lookat_W: tuple[float, ...] = (0.35, 0.05, 0.45)  #: (3,) [m]
-    distance: float = 2.2  #: [m]
-    azimuth: float = 2.2  #: [rad] direction of view about z, 0 along x
-    elevation: float = -0.35  #: [rad] negative looks down
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +84,7 @@ class World:
             if sensed is not None and name not in sensed:
                 geom = int(self._model.body_geomadr[1 + self._links + row])
                 self._model.geom_rgba[geom] = _UNSENSED_COLOR
-        self._renderers: dict[tuple[int, int], Any] = {}
+        self._pictures = Pictures(self._model)
         self._place_scene(0.0)
         self.place(np.zeros(robot.n_q))
 
@@ -218,23 +168,13 @@ class World:
         Raises:
             SimulationError: there is no way to draw off screen.
         """
-        camera = camera or Camera()
-        view = mujoco.MjvCamera()
-        view.lookat[:] = camera.lookat_W
-        view.distance = camera.distance
-        view.azimuth, view.elevation = np.rad2deg([camera.azimuth, camera.elevation])
-        renderer = self._renderer(size)
-        renderer.update_scene(self._data, view)
-        for mark in marks:
-            _draw(renderer.scene, mark)
-        pixels: NDArray[np.uint8] = renderer.render().copy()
+        pixels = self._pictures.draw(self._data, marks, size, camera or Camera())
         self._check()
         return pixels
 
     def close(self) -> None:
         """Frees what drawing holds."""
-        while self._renderers:
-            self._renderers.popitem()[1].close()
+        self._pictures.close()
 
     def _check(self) -> None:
         numbers = [int(number) for number in self._data.warning.number]
@@ -263,20 +203,6 @@ class World:
         for row, pose in enumerate(poses, first):
             self._data.mocap_pos[row] = pose[:3, 3]
             self._data.mocap_quat[row] = _quaternion(pose[:3, :3])
-
-    def _renderer(self, size: tuple[int, int]) -> Any:
-        if size not in self._renderers:
-            try:
-                self._renderers[size] = mujoco.Renderer(self._model, size[1], size[0])
-            except Exception as error:  # each GL backend fails in its own way
-                cure = "install libegl1 and libgl1-mesa-dri, or libosmesa6"
-                if _TOO_LATE:
-                    cure = "mujoco was imported before proxcgal.sim: import that first"
-                backend = os.environ.get("MUJOCO_GL")
-                raise SimulationError(
-                    f"cannot draw off screen with MUJOCO_GL={backend}: {error}; {cure}"
-                ) from None
-        return self._renderers[size]
 
 
 _Shapes = tuple[type[Solid], ...]
@@ -319,7 +245,7 @@ def _compile(robot: Robot, shapes: _Shapes) -> Any:
             type=_GEOMS[shape], size=(0.5, 0.5, 0.5), contype=0, conaffinity=0,
             rgba=_OBSTACLE_COLOR,
         )  # fmt: skip
-    _furnish(spec)
+    furnish(spec)
     try:
         return spec.compile()
     except ValueError as error:
@@ -330,42 +256,3 @@ def _quaternion(rotation: Array) -> Array:
     quaternion = np.empty(4)
     mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(rotation).ravel())
     return quaternion
-
-
-def _furnish(spec: Any) -> None:
-    """Light, sky and floor: only for pictures."""
-    spec.visual.global_.offwidth, spec.visual.global_.offheight = 1920, 1080
-    spec.visual.quality.numslices, spec.visual.quality.numstacks = 8, 6
-    spec.visual.headlight.ambient = (0.45, 0.45, 0.45)
-    spec.visual.headlight.diffuse = (0.45, 0.45, 0.45)
-    spec.visual.headlight.specular = (0.1, 0.1, 0.1)
-    spec.worldbody.add_light(
-        pos=(0.5, -1.0, 3.0), dir=(0.0, 0.3, -1.0), diffuse=(0.35, 0.35, 0.35),
-        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, castshadow=False,  # it halves the time
-    )  # fmt: skip
-    spec.add_texture(
-        name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, width=64, height=64,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT, rgb1=(1, 1, 1), rgb2=(0.92, 0.94, 0.97),
-    )  # fmt: skip
-    spec.add_material(name="floor", rgba=(0.9, 0.92, 0.94, 1.0), emission=0.25)
-    spec.worldbody.add_geom(
-        name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=(3.0, 3.0, 0.1),
-        group=_FLOOR, contype=0, conaffinity=0, material="floor",
-    )  # fmt: skip
-
-
-def _draw(scene: Any, mark: Spheres | Arrow) -> None:
-    """Appends a mark to what will be drawn, as far as the scene has room."""
-    color = np.array(mark.color, np.float32)
-    if isinstance(mark, Spheres):
-        kind, size = mujoco.mjtGeom.mjGEOM_SPHERE, np.full(3, mark.radius)
-        upright = np.eye(3).ravel()
-        for center in mark.centers_W[: scene.maxgeom - scene.ngeom]:
-            mujoco.mjv_initGeom(scene.geoms[scene.ngeom], kind, size, center, upright, color)
-            scene.ngeom += 1
-    elif scene.ngeom < scene.maxgeom and np.any(mark.tip_W != mark.tail_W):
-        kind = mujoco.mjtGeom.mjGEOM_ARROW
-        geom = scene.geoms[scene.ngeom]
-        mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.zeros(9), color)
-        mujoco.mjv_connector(geom, kind, mark.width, mark.tail_W, mark.tip_W)
-        scene.ngeom += 1

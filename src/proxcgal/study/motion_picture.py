@@ -17,7 +17,8 @@ from proxcgal.recording.render import RecordedMoment, draw, recorded_moments, wr
 from proxcgal.scenario.hri_scenario import HriScenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.scene.solids import Box
-from proxcgal.sim.world import Camera, World
+from proxcgal.sim.picture import Camera
+from proxcgal.sim.world import World
 from proxcgal.study.plotting import CONTROLLER_COLOURS, CONTROLLER_NAMES, GREY
 
 MOVING, STILL = "motion.gif", "motion.png"

@@ -62,10 +62,8 @@ def replay_moments(
             for row, (tick, q) in enumerate(zip(recording.ticks, recording.postures(), strict=True))
             if not whole or row % step == 0 or row == last
         ]
-        return ReplayedRun(
-            SceneModel.of(setup), settings.controller, tuple(moments), None, count,
-            recording.has_clouds,
-        )  # fmt: skip
+        model, known = SceneModel.of(setup), recording.has_clouds
+        return ReplayedRun(model, settings.controller, tuple(moments), None, count, known)
     again = Replay(recording, controller, overrides)
     moments, same = [], 0
     both = zip(recording.ticks, again, recording.postures(), strict=True)
