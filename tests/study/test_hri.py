@@ -16,7 +16,7 @@ from proxcgal.scenario.loading import load_scenario
 from proxcgal.scene.human.motion import move
 from proxcgal.scene.human.recorded import write_motion
 from proxcgal.scene.human.subject import draw_subject
-from proxcgal.sim.waypoints import Waypoints
+from proxcgal.sim.source import Waypoints
 from proxcgal.study.hri import campaign as hri_campaign
 from proxcgal.study.hri.figures import figures
 from proxcgal.study.hri.layouts import JITTER_M, draw_layout

@@ -50,9 +50,10 @@ def recorded_moments(
     rows = np.searchsorted([tick.inputs.time for tick in recording.ticks], times)
     wanted = np.minimum(rows, len(recording.ticks) - 1).tolist()
     elapsed, postures = _elapsed(recording), list(recording.postures())
-    taken = {}
-    for row, tick, clouds in _with_clouds(recording, controller, wanted):
-        taken[row] = RecordedMoment(tick, clouds, float(elapsed[row]), postures[row])
+    taken = {
+        row: RecordedMoment(tick, clouds, float(elapsed[row]), postures[row])
+        for row, tick, clouds in _with_clouds(recording, controller, wanted)
+    }
     return [taken[row] for row in wanted]
 
 

@@ -9,10 +9,9 @@ from proxcgal import _core
 from proxcgal.core.typing import Array, Bools
 from proxcgal.scenario.setup import Setup
 from proxcgal.sim.actuation import Actuation
-from proxcgal.sim.mount_faults import RealMounts
+from proxcgal.sim.faults import RealMounts
 from proxcgal.sim.range_sensor import ZONES, RangeModel
 from proxcgal.sim.tick import TickInput
-from proxcgal.sim.waypoints import Waypoints
 from proxcgal.sim.world import Hits, World
 
 _BEFORE = 1 << 20  # index of the scans before the run: their noise is none of the run's
@@ -41,6 +40,42 @@ class RecordedSource:
 
     def command(self, qd: Array) -> None:
         """Nothing moves: it happened already."""
+
+
+class Waypoints:
+    """The goal that is due; the next one on arrival, or when patience has run out."""
+
+    def __init__(self, goals: Sequence[Array], arrival: float, patience: float) -> None:
+        """Begins with the first goal.
+
+        Args:
+            goals: (4, 4) T_WT each, at least one.
+            arrival: distance to a goal's position at which the next one is due [m].
+            patience: time after which the next goal is due in any case [s].
+        """
+        there = list(range(len(goals)))
+        self._goals = goals
+        self._order = there + there[-2:0:-1]  # 0 1 2 1, and again
+        self._arrival = arrival
+        self._patience = patience
+        self._place = 0
+        self._since = 0.0
+
+    def at(self, time: float, tool_W: Array) -> Array:
+        """(4, 4) T_WT of the goal that is due.
+
+        Args:
+            time: of this tick, not before the last one's [s].
+            tool_W: (3,) [m].
+        """
+        goal = self._goals[self._order[self._place]]
+        if len(self._goals) > 1:
+            there = np.linalg.norm(goal[:3, 3] - tool_W) <= self._arrival
+            if there or time - self._since >= self._patience - 1e-9:
+                self._place = (self._place + 1) % len(self._order)
+                self._since = time
+                goal = self._goals[self._order[self._place]]
+        return goal
 
 
 class SimulatedSource:
@@ -82,10 +117,11 @@ class SimulatedSource:
         assert self._world is not None
         rows = list(range(len(self._scans)))
         hits = self._cast(rows, 0.0, self._setup.q0)
-        sent = []
-        for index in range(_BEFORE, _BEFORE + scans):
-            sent += self._scans_of(rows, index, 0.0, hits)
-        return sent
+        return [
+            scan
+            for index in range(_BEFORE, _BEFORE + scans)
+            for scan in self._scans_of(rows, index, 0.0, hits)
+        ]
 
     def read(self) -> TickInput | None:
         """Moves the arm by the last command and collects the scans made on the way."""
@@ -104,8 +140,7 @@ class SimulatedSource:
             rows = [int(row) for row in np.flatnonzero(stamps == stamp)]
             scans += self._measure(rows, stamp, self._arm.within_step(stamp - start))
         self._tick += 1
-        tool_W = np.asarray(self._setup.robot.tool_pose(self.q))[:3, 3]
-        goal = self._waypoints.at(time, tool_W)
+        goal = self._waypoints.at(time, np.asarray(self._setup.robot.tool_pose(self.q))[:3, 3])
         return TickInput(time, self.q, goal, tuple(scans), self._world is None)
 
     def command(self, qd: Array) -> None:

@@ -10,7 +10,7 @@ import viser
 import viser.transforms
 
 from proxcgal.sim.moment import Posed
-from proxcgal.trial.walkthrough.interactive_hand import HAND
+from proxcgal.trial.walkthrough.operator_hand import HAND
 from proxcgal.viewer.access import Gate
 from proxcgal.viewer.client_messages import between, one_of, switch
 from proxcgal.viewer.command_queue import ROOM, CommandQueue

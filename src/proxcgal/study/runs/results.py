@@ -142,7 +142,7 @@ def check(
     """
     from proxcgal.scenario.setup import Setup
     from proxcgal.scenario.walkthrough_scenario import WalkScenario
-    from proxcgal.trial.assembly import assemble
+    from proxcgal.trial.trial import assemble
     from proxcgal.trial.walkthrough.setup import WalkSetup
 
     if isinstance(scenario, WalkScenario):
