@@ -164,18 +164,12 @@ __all__ = [
 #: Imported on first use, by module: pydantic, mesh readers and the simulator take longer to import
 #: than all the rest.
 _LATER = {
-    "models": (
-        "MountCheck",
-        "MountChecks",
-        "Robot",
-        "attach",
-        "attach_mesh",
-        "check_mounts",
-        "fit_capsules",
-        "list_robots",
-        "load_robot",
-        "ring_skin",
-    ),
+    "models.assembly": ("attach", "attach_mesh"),
+    "models.builtin": ("list_robots",),
+    "models.capsule_fit": ("fit_capsules",),
+    "models.mount_check": ("MountCheck", "MountChecks", "check_mounts"),
+    "models.robots": ("Robot", "load_robot"),
+    "models.skins": ("ring_skin",),
     "scenario.loading": ("load_scenario",),
     "server.goals": ("GoalRefusedError", "JointGoal"),
     "server.joint_server": ("JointRobotServer",),

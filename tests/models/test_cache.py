@@ -10,8 +10,8 @@ import proxcgal as px
 from proxcgal.core import cache
 from proxcgal.models.formats import description_reader
 from proxcgal.models.mesh import resolution
+from proxcgal.models.mesh.resolution import subdivide
 from proxcgal.models.mesh.shapes import box
-from proxcgal.models.mesh.subdivision import subdivide
 
 OBJ = "v 0 0 0\nv {x} 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 

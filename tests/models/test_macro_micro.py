@@ -93,7 +93,7 @@ def test_an_arms_manipulability_is_a_share_of_its_largest(joint: px.Robot) -> No
     unit = macro_micro.largest_manipulability(joint, first, joints)
     rng = np.random.default_rng(1)
     q = rng.uniform(np.maximum(joint.q_min, -3), np.minimum(joint.q_max, 3))
-    J = macro_micro.tool_jacobian(joint, q)[:, 6:]
+    J = joint.tool_jacobian(q)[:, 6:]
     share = float(np.sqrt(np.linalg.det(J @ J.T))) / unit
     assert 0.0 < share < 1.0
     task = px.Manipulability(first_joint=first, joints=joints, unit=unit, target=0.9, low=2, high=3)

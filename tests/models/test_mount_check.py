@@ -14,7 +14,7 @@ from proxcgal.scenario.loading import load_scenario
 from proxcgal.scenario.scenario import Scenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.sim.assembly import MOUNT_CHECK_SCANS
-from proxcgal.sim.mount_faults import RealMounts
+from proxcgal.sim.faults import RealMounts
 from proxcgal.sim.source import SimulatedSource
 from proxcgal.sim.world import World
 from proxcgal.trial.trial import run_trial

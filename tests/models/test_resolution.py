@@ -12,9 +12,8 @@ from scipy.spatial import cKDTree
 
 import proxcgal as px
 from proxcgal.models.mesh.decimation import decimate
-from proxcgal.models.mesh.resolution import control_mesh
+from proxcgal.models.mesh.resolution import control_mesh, subdivide
 from proxcgal.models.mesh.shapes import box, cylinder, ellipsoid
-from proxcgal.models.mesh.subdivision import subdivide
 from proxcgal.models.mesh.triangles import (
     compact,
     double_areas,

@@ -8,7 +8,7 @@ from proxcgal.scenario.walkthrough_scenario import WalkScenario
 from proxcgal.sim.moment import Moment
 from proxcgal.trial.interactive import LiveTrial
 from proxcgal.trial.walkthrough.interactive import WalkTrial
-from proxcgal.trial.walkthrough.interactive_hand import ACCELERATION, HAND, SPEED, InteractiveHand
+from proxcgal.trial.walkthrough.operator_hand import ACCELERATION, HAND, SPEED, InteractiveHand
 from proxcgal.trial.walkthrough.setup import PERIOD
 
 

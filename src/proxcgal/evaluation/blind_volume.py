@@ -37,7 +37,8 @@ def volume_within(robot: Robot, q: Array, reach: float = REACH_M) -> Array:
         q: (n_q,) posture.
         reach: [m]
     """
-    clouds = _placed_links(robot, q)
+    links = zip(robot.link_names, np.asarray(robot.link_poses(q)), strict=True)
+    clouds = [placed(T_WL, robot.mesh(name)[0]) for name, T_WL in links]
     low = np.min([cloud.min(axis=0) for cloud in clouds], axis=0) - reach
     high = np.max([cloud.max(axis=0) for cloud in clouds], axis=0) + reach
     axes = [np.arange(a, b, _SPACING_M) for a, b in zip(low, high, strict=True)]
@@ -97,8 +98,3 @@ def blind_volume(setup: Setup, stamps: Sequence[float], postures: Sequence[Array
     """
     points_W = volume_within(setup.robot, postures[-1])
     return BlindVolume(points_W, stamps[-1] - last_seen(setup, points_W, stamps, postures))
-
-
-def _placed_links(robot: Robot, q: Array) -> list[Array]:
-    poses = np.asarray(robot.link_poses(q))
-    return [placed(T, robot.mesh(name)[0]) for name, T in zip(robot.link_names, poses, strict=True)]

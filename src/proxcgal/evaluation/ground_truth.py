@@ -4,6 +4,7 @@ For the evaluation only; no controller ever sees them. What is skipped is skippe
 proves it: between two postures a distance shrinks by no more than the two surfaces moved.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -39,9 +40,9 @@ class GroundTruth:
     def __init__(self, robot: Robot, scene: Scene) -> None:
         """Builds the scene's surfaces; the robot's are kept from trial to trial."""
         self._robot = robot
-        self._surfaces = Surfaces.of(robot)
-        self._scene = _SceneDistance(self._surfaces, scene)
-        self._own = _OwnDistance(self._surfaces)
+        surfaces = Surfaces.of(robot)
+        self._scene = _SceneDistance(surfaces, scene, robot.link_names)
+        self._own = _OwnDistance(surfaces)
 
     def __call__(self, q: Array, time: float = 0.0) -> TrueDistances:
         """What is true at a posture, with the scene where it is at `time` [s].
@@ -51,31 +52,18 @@ class GroundTruth:
         the run is exact.
         """
         poses_W = np.asarray(self._robot.link_poses(q))
-        return self._to_scene(poses_W, time)._replace(own=self._own.at(poses_W))
+        return self._scene.at(poses_W, time)._replace(own=self._own.at(poses_W))
 
     def nearest(self, q: Array, time: float = 0.0) -> TrueDistances:
         """The same of the scene only: `own` is not asked, nan."""
-        return self._to_scene(np.asarray(self._robot.link_poses(q)), time)
-
-    def _to_scene(self, poses_W: Array, time: float) -> TrueDistances:
-        found = self._scene.at(poses_W, time)
-        link = self._robot.link_names[found.link] if found.link >= 0 else ""
-        return TrueDistances(found.distance, link, np.nan, found.solid, found.point_W)
-
-
-class _Nearest(NamedTuple):
-    distance: float = np.inf
-    link: int = -1
-    solid: str = ""
-    point_W: Array | None = None
+        return self._scene.at(np.asarray(self._robot.link_poses(q)), time)
 
 
 class _SceneDistance:
     """Least distance from moving links to the scene's solids, exact at every call."""
 
-    def __init__(self, surfaces: Surfaces, scene: Scene) -> None:
-        self._surfaces = surfaces
-        self._scene = scene
+    def __init__(self, surfaces: Surfaces, scene: Scene, links: Sequence[str]) -> None:
+        self._surfaces, self._scene, self._links = surfaces, scene, links
         # A solid in its own frame: there a box's faces are their own bounding boxes.
         self._trees = [_core.MeshTree(*solid.core()) for solid in scene.solids]
         self._T_WO, self._T_OW = np.empty((0, 4, 4)), np.empty((0, 4, 4))
@@ -84,8 +72,8 @@ class _SceneDistance:
         self._at_least = np.zeros(len(rows))
         self._sweep: Array | None = None
 
-    def at(self, poses_W: Array, time: float) -> _Nearest:
-        """The nearest pair; without any, nothing at infinity."""
+    def at(self, poses_W: Array, time: float) -> TrueDistances:
+        """The nearest pair; without any, nothing at infinity. `own` is not asked, nan."""
         links, solids = self._pairs.T
         if self._sweep is None or not self._scene.still:
             self._T_WO = self._scene.poses(time)
@@ -95,7 +83,7 @@ class _SceneDistance:
         if self._sweep is not None:
             self._at_least -= most_moved(self._sweep, sweep)
         self._sweep = sweep
-        best = _Nearest()
+        best = NOT_ASKED._replace(distance=np.inf)
         for row in np.argsort(self._at_least):
             if self._at_least[row] >= best.distance:
                 break
@@ -109,8 +97,10 @@ class _SceneDistance:
                 apart = on_link_O - on_core_O
                 far = max(float(np.linalg.norm(apart)), 1e-12)
                 on_solid_O = on_core_O + apart * min(self._scene.solids[solid].rounding / far, 1.0)
-                point_W = placed(self._T_WO[solid], on_solid_O)
-                best = _Nearest(distance, link, self._scene.names[solid], point_W)
+                best = TrueDistances(
+                    distance, self._links[link], np.nan, self._scene.names[solid],
+                    placed(self._T_WO[solid], on_solid_O),
+                )  # fmt: skip
         return best
 
 

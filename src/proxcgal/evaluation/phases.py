@@ -1,16 +1,10 @@
 """Mean distances of a trial beside a person: over the whole cycle and phase by phase."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from proxcgal.core.typing import Array
 from proxcgal.evaluation.trial_log import NOTHING, TrialLog, sampled_ticks
-
-if TYPE_CHECKING:
-    from proxcgal.scenario.hri_scenario import HriScenario
+from proxcgal.scenario.hri_scenario import HriScenario
 
 SAMPLES_HZ = 15.0  # the sensors' rate: means of the true distance and all courses are taken at it
 Means = dict[str, tuple[float | None, float | None]]  # true and seen [m], None without any

@@ -9,7 +9,6 @@ from proxcgal.core.modes import HOLD
 from proxcgal.core.transforms import inverse, pose_errors, sine_axis
 from proxcgal.core.typing import Array
 from proxcgal.evaluation.termination import Ending, StallCause
-from proxcgal.models.macro_micro import tool_jacobian
 from proxcgal.scenario.setup import Setup
 from proxcgal.sim.tick import TickResult
 
@@ -94,7 +93,7 @@ def _towards(setup: Setup, q: Array, goal: Array, points_W: Array) -> tuple[floa
     points_W = np.ascontiguousarray(points_W, np.float64)
     for tick in range(_SETTLED):
         out = settings.tick_known(tick * settings.config.period, q, points_W, goal)
-    velocity = tool_jacobian(setup.robot, q) @ out.qd
+    velocity = setup.robot.tool_jacobian(q) @ out.qd
     T_WT = np.asarray(setup.robot.tool_pose(q))
     ahead_W = goal[:3, 3] - T_WT[:3, 3]
     finish = setup.scenario.ends()

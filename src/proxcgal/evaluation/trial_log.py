@@ -1,12 +1,10 @@
 """One run as arrays over its ticks, and its numbers."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,7 +72,7 @@ class TrialLog:
         elapsed: Array | None = None,
         recording_failure: str | None = None,
         ending: Ending | None = None,
-    ) -> TrialLog:
+    ) -> Self:
         """Puts ticks together; without `elapsed` the caller's clock is believed."""
         inputs = [tick.inputs for tick in ticks]
         results = [tick.result for tick in ticks]
@@ -186,5 +184,4 @@ def _tool(robot: Robot, q: Array) -> Array:
 def _angles(here: Array, there: Array) -> Array:
     """(n,) rotation angle between (n, 3, 3) orientations [rad]; accurate near 0 too."""
     chord = np.linalg.norm(there - here, axis=(1, 2)) / np.sqrt(8.0)
-    angles: Array = 2.0 * np.arcsin(np.clip(chord, 0.0, 1.0))
-    return angles
+    return np.asarray(2.0 * np.arcsin(np.clip(chord, 0.0, 1.0)))

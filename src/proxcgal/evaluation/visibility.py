@@ -5,7 +5,7 @@ import numpy as np
 from proxcgal.core.typing import Array, Bools
 from proxcgal.scenario.setup import Setup
 from proxcgal.scene.obstacles import Scene
-from proxcgal.sim.mount_faults import RealMounts
+from proxcgal.sim.faults import RealMounts
 from proxcgal.sim.world import World
 
 _BEFORE_M = 0.005  # a ray that ends so little before a point on a surface has reached it

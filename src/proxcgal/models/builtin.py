@@ -39,8 +39,7 @@ def _panda() -> RobotDescription:
 
 
 def _kr150() -> RobotDescription:
-    folder = "xacro/kuka_description/kuka_kr150"
-    path = _data("rtbdata", f"{folder}/urdf/kr150_2.xacro", "rtb-data")
+    path = _data("rtbdata", "xacro/kuka_description/kuka_kr150/urdf/kr150_2.xacro", "rtb-data")
     packages = {"kuka_kr150_support": path.parents[1]}
     found = read_description(path, base="base_link", packages=packages)
     return _renamed(found, "kr150", "tool0", "tool0")
@@ -50,10 +49,6 @@ def _kr150() -> RobotDescription:
 def ga_ol() -> CapsuleRobot:
     """The painting arm of [WT] as its capsules, masses and brakes; its lengths are ours."""
     return read_capsule_robot(_GA_OL)
-
-
-def _ga_ol() -> RobotDescription:
-    return ga_ol().description(_GA_OL.name)
 
 
 _GA_OL = Path(__file__).with_name("ga_ol.toml")
@@ -73,7 +68,11 @@ BUILTIN: dict[str, Builtin] = {
     "ur10e": Builtin("Universal Robots UR10e, 6 joints", _ur10e, LIMITS["ur10e"]),
     "panda": Builtin("Franka Emika Panda, 7 joints, no hand", _panda, LIMITS["panda"]),
     "kr150": Builtin("KUKA KR 150-2, 6 joints", _kr150, LIMITS["kr150"]),
-    "ga_ol": Builtin("painting arm of capsules, 6 joints, lengths and masses ours", _ga_ol, None),
+    "ga_ol": Builtin(
+        "painting arm of capsules, 6 joints, lengths and masses ours",
+        lambda: ga_ol().description(_GA_OL.name),
+        None,
+    ),
     "kr150_ur10e": Builtin("UR10e on the flange of a KUKA KR 150-2, 12 joints", _kr150_ur10e, None),
 }
 

@@ -1,17 +1,11 @@
 """Capsules fitted to links, so that each link lies inside of its own."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from proxcgal._core import Capsule, LinkCapsule
 from proxcgal.core.transforms import axes_along
 from proxcgal.core.typing import Array
-
-if TYPE_CHECKING:
-    from proxcgal.models.robots import Robot
+from proxcgal.models.robots import Robot
 
 _ROUNDING = 1e-12  # [m] by which a fitted radius is widened, so that no vertex is outside by a bit
 _UP = (0.0, 0.0, 1.0)  # an axis where there is none

@@ -1,9 +1,7 @@
 """What a robot is made of, read from a file and independent of the C++ core."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
@@ -115,10 +113,6 @@ class RobotDescription:
             f"robot '{self.name}' has no link '{name}' with a mesh; it has "
             f"{listed(self.link_names)}"
         )
-
-    def with_tool(self, name: str) -> RobotDescription:
-        """The same robot with another of its frames as the tool."""
-        return replace(self, tool=self.frame(name).name)
 
     def __repr__(self) -> str:
         """One line: what there is of it."""

@@ -1,23 +1,15 @@
 """Two arms of one chain: the macro arm carries the micro arm, and what each does."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-from weakref import WeakKeyDictionary
-
 import numpy as np
 
 from proxcgal import _core
 from proxcgal.core.errors import ConfigError
 from proxcgal.core.typing import Array
+from proxcgal.models.robots import Robot, once_per_robot
 from proxcgal.models.surfaces import Surfaces, cached_pairs, random_postures
-
-if TYPE_CHECKING:
-    from proxcgal.models.robots import Robot
 
 _POSTURES = 4000
 _SAMPLES, _FEW_JOINTS = 1000, 3
-_largest: WeakKeyDictionary[Robot, dict[tuple[int, int], float]] = WeakKeyDictionary()
 
 
 def part(robot: Robot, macro_joints: int, arm: str) -> tuple[int, int]:
@@ -69,33 +61,19 @@ def _never_near(robot: Robot, pairs: list[tuple[int, int]], d_min: float) -> set
     return {(int(a), int(b)) for a, b in cached_pairs("never_near", key, never_near)}
 
 
-def tool_jacobian(robot: Robot, q: Array) -> Array:
-    """(6, n_q) at the tool, linear rows first, in world."""
-    tool_W = np.asarray(robot.tool_pose(q))[:3, 3]
-    return np.asarray(robot.jacobian(q, tool_link(robot), tool_W))
-
-
-def tool_link(robot: Robot) -> str:
-    """The last link that moves with the tool."""
-    joint = robot.description.tool_frame.joint
-    return next(link.name for link in reversed(robot.description.links) if link.joint == joint)
-
-
 def manipulability(J: Array, first: int, joints: int) -> float:
     """sqrt(det(J J')) of an arm's columns of the tool's Jacobian."""
     own = J[:, first : first + joints]
     return float(np.prod(np.linalg.svd(own, compute_uv=False)))
 
 
+@once_per_robot
 def largest_manipulability(robot: Robot, first: int, joints: int) -> float:
     """Of 4000 random postures of the whole robot, the same ones for the same robot."""
-    known = _largest.setdefault(robot, {})
-    if (first, joints) not in known:
-        known[first, joints] = max(
-            manipulability(tool_jacobian(robot, q), first, joints)
-            for q in random_postures(robot, _POSTURES)
-        )
-    return known[first, joints]
+    return max(
+        manipulability(robot.tool_jacobian(q), first, joints)
+        for q in random_postures(robot, _POSTURES)
+    )
 
 
 def speeds(robot: Robot, macro_joints: int, q: Array, qd: Array) -> Array:
@@ -109,7 +87,7 @@ def speeds(robot: Robot, macro_joints: int, q: Array, qd: Array) -> Array:
     """
     out = np.zeros((len(q), 2))
     for row, (posture, velocity) in enumerate(zip(q, qd, strict=True)):
-        J = tool_jacobian(robot, posture)[:3]
+        J = robot.tool_jacobian(posture)[:3]
         out[row, 0] = np.linalg.norm(J[:, :macro_joints] @ velocity[:macro_joints])
         out[row, 1] = np.linalg.norm(J[:, macro_joints:] @ velocity[macro_joints:])
     return out

@@ -1,14 +1,16 @@
 """Robots: from a name or a file to what the controller and the simulator use."""
 
+import functools
 import hashlib
 import json
 import os
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Concatenate, ParamSpec, TypeVar
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -16,7 +18,7 @@ from proxcgal import _core
 from proxcgal.core.cache import hash_mesh
 from proxcgal.core.errors import ConfigError, ModelError, ModelWarning
 from proxcgal.core.typing import Array, Ints
-from proxcgal.models.builtin import BUILTIN, list_robots
+from proxcgal.models.builtin import BUILTIN
 from proxcgal.models.description import RobotDescription, listed
 from proxcgal.models.formats.description_reader import read_description
 from proxcgal.models.formats.paths import ROBOT_SUFFIXES, is_robot_file
@@ -28,7 +30,8 @@ from proxcgal.models.mesh.resolution import (
     control_mesh,
 )
 
-__all__ = ["Robot", "list_robots", "load_robot"]
+P = ParamSpec("P")
+T = TypeVar("T")
 
 
 class Robot(_core.Robot):
@@ -53,24 +56,15 @@ class Robot(_core.Robot):
         ]
         tool = description.tool_frame
         super().__init__(description.name, joints, links, tool.name, tool.joint, tool.T_JF)
-        self._description = description
-        self._control = tuple(control)
-        self._hashes: dict[str, dict[str, str]] = {}
-
-    @property
-    def description(self) -> RobotDescription:
-        """What the robot was built from."""
-        return self._description
-
-    @property
-    def control(self) -> tuple[ControlMesh, ...]:
-        """The controller's meshes, in the order of link_names."""
-        return self._control
+        #: What the robot was built from.
+        self.description = description
+        #: The controller's meshes, in the order of link_names.
+        self.control = tuple(control)
 
     @property
     def source(self) -> str:
         """The file that the robot was read from."""
-        return self._description.source
+        return self.description.source
 
     def full_mesh(self, link: str) -> tuple[Array, Ints]:
         """The link's mesh at full resolution: vertices_L (v, 3) [m] and triangles (f, 3).
@@ -78,31 +72,28 @@ class Robot(_core.Robot):
         Raises:
             ModelError: no such link; lists those there are.
         """
-        found = self._description.links[self._description.link_row(link)]
+        found = self.description.links[self.description.link_row(link)]
         return found.vertices_L, found.triangles
 
-    @property
+    @functools.cached_property
     def mesh_hashes(self) -> dict[str, dict[str, str]]:
         """SHA-256 of each link's meshes: {link: {"full": ..., "control": ...}}."""
-        if not self._hashes:
-            self._hashes = {
-                link.name: {
-                    "full": hash_mesh(link.vertices_L, link.triangles),
-                    "control": hash_mesh(mesh.vertices_L, mesh.triangles),
-                }
-                for link, mesh in zip(self._description.links, self._control, strict=True)
+        return {
+            link.name: {
+                "full": hash_mesh(link.vertices_L, link.triangles),
+                "control": hash_mesh(mesh.vertices_L, mesh.triangles),
             }
-        return self._hashes
+            for link, mesh in zip(self.description.links, self.control, strict=True)
+        }
 
     @property
     def digest(self) -> str:
         """The same where joints, limits, tool, links and both meshes of each are the same."""
-        described = self._description
         parts = [
-            [asdict(joint) for joint in described.joints],
-            [[link.name, link.joint, link.T_JL] for link in described.links],
-            asdict(described.tool_frame),
-            [mesh.deviation for mesh in self._control],
+            [asdict(joint) for joint in self.description.joints],
+            [[link.name, link.joint, link.T_JL] for link in self.description.links],
+            asdict(self.description.tool_frame),
+            [mesh.deviation for mesh in self.control],
             self.mesh_hashes,
         ]
         text = json.dumps(parts, default=lambda array: array.tolist())
@@ -110,17 +101,33 @@ class Robot(_core.Robot):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For workers in other processes."""
-        return (type(self), (self._description, self._control))
+        return (type(self), (self.description, self.control))
 
     def __repr__(self) -> str:
         """One line: joints, tool, links, and how coarse the controller's meshes are."""
-        counts = [len(mesh.vertices_L) for mesh in self._control]
-        worst = max(mesh.deviation for mesh in self._control)
+        counts = [len(mesh.vertices_L) for mesh in self.control]
+        worst = max(mesh.deviation for mesh in self.control)
         return (
             f"<Robot '{self.name}': {self.n_q} joints, tool '{self.tool}', {len(counts)} links "
             f"with {min(counts)} to {max(counts)} vertices, within {worst * 1000:.1f} mm of the "
             f"full meshes>"
         )
+
+
+def once_per_robot(
+    make: Callable[Concatenate[Robot, P], T],
+) -> Callable[Concatenate[Robot, P], T]:
+    """Keeps what a function makes of a robot and other arguments, as long as the robot lives."""
+    known: WeakKeyDictionary[Robot, dict[Any, T]] = WeakKeyDictionary()
+
+    @functools.wraps(make)
+    def kept(robot: Robot, /, *args: P.args, **named: P.kwargs) -> T:
+        made, key = known.setdefault(robot, {}), (args, tuple(named.items()))
+        if key not in made:
+            made[key] = make(robot, *args, **named)
+        return made[key]
+
+    return kept
 
 
 def load_robot(
@@ -171,10 +178,9 @@ def load_robot(
         description, builtin.limits if builtin else None, speed_limits, acceleration_limits
     )
     if tool is not None:
-        description = description.with_tool(tool)
+        description = replace(description, tool=description.frame(tool).name)
     description.tool_frame  # noqa: B018  raises where it is not known, before the meshes take time
-    control = control_meshes(description, vertices_per_link, max_deviation)
-    return Robot(description, control)
+    return Robot(description, control_meshes(description, vertices_per_link, max_deviation))
 
 
 def control_meshes(

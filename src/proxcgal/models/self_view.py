@@ -6,10 +6,9 @@ from numpy.typing import NDArray
 from proxcgal import _core
 from proxcgal.core.transforms import rotation_from_vector
 from proxcgal.core.typing import Array
-from proxcgal.models.robots import Robot
+from proxcgal.models.robots import Robot, once_per_robot
 
 _MOUNTING = 0.005  # [m] of each ray, as `filter.min_hit`
-_known: dict[str, list[_core.MeshTree]] = {}
 
 
 class Body:
@@ -43,12 +42,10 @@ class Body:
         return length + _MOUNTING
 
 
+@once_per_robot
 def _trees(robot: Robot) -> list[_core.MeshTree]:
-    """Full surfaces, of the robot that was asked last."""
-    if robot.digest not in _known:
-        _known.clear()
-        _known[robot.digest] = [_core.MeshTree(*robot.full_mesh(n)) for n in robot.link_names]
-    return _known[robot.digest]
+    """Full surfaces, kept as long as the robot lives."""
+    return [_core.MeshTree(*robot.full_mesh(name)) for name in robot.link_names]
 
 
 class View:
@@ -71,5 +68,4 @@ class View:
         rays = self._rays_S[zones] @ np.swapaxes(R_WS, 1, 2)
         starts = np.broadcast_to(origins[:, None, :], rays.shape)
         lengths = self._body.cast(starts.reshape(-1, 3), rays.reshape(-1, 3))
-        ranges: Array = lengths.reshape(len(moved), len(zones)) * self._z_per_length[zones]
-        return ranges
+        return np.asarray(lengths.reshape(len(moved), len(zones)) * self._z_per_length[zones])

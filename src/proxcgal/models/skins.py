@@ -140,16 +140,12 @@ def _centre(
     vertices: Array, triangles: Ints, axis: Array, across: Array, height: float, what: str
 ) -> Array:
     """Centre (3,) of the link's outline in the plane axis . x = height: middle of its extent."""
+    # From each corner to the next, (3, f).
+    start, end = triangles.T, np.roll(triangles.T, -1, axis=0)
     up = vertices @ axis - height
-    side = up[triangles]
-    points = []
-    for k in range(3):
-        a, b = side[:, k], side[:, (k + 1) % 3]
-        cut = (a < 0) != (b < 0)
-        share = (a[cut] / (a[cut] - b[cut]))[:, None]
-        p, q = vertices[triangles[cut, k]], vertices[triangles[cut, (k + 1) % 3]]
-        points.append(p + share * (q - p))
-    outline = np.concatenate(points)
+    cut = (up[start] < 0) != (up[end] < 0)
+    p, q, a, b = vertices[start[cut]], vertices[end[cut]], up[start[cut]], up[end[cut]]
+    outline = p + (a / (a - b))[:, None] * (q - p)
     if len(outline) < 3:
         raise GeometryError(f"{what}: no surface there")
     third = np.cross(axis, across)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING, Any, ClassVar
-from weakref import WeakKeyDictionary
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +14,7 @@ from proxcgal import _core
 from proxcgal.core.cache import Cache, Stored
 from proxcgal.core.transforms import inverse, placed
 from proxcgal.core.typing import Array, Bools
-
-if TYPE_CHECKING:
-    from proxcgal.models.robots import Robot
+from proxcgal.models.robots import Robot, once_per_robot
 
 #: Links nearer than this in every random posture are built that way [m].
 ALWAYS_NEAR = 0.05
@@ -27,8 +24,6 @@ _PROBES = 32
 
 class Surfaces:
     """What never changes about a robot; made once for each."""
-
-    _known: ClassVar[WeakKeyDictionary[Robot, Surfaces]] = WeakKeyDictionary()
 
     def __init__(self, robot: Robot) -> None:
         """Indexes every link's full mesh."""
@@ -62,12 +57,11 @@ class Surfaces:
             ],
         )
 
-    @classmethod
-    def of(cls, robot: Robot) -> Surfaces:
+    @staticmethod
+    @once_per_robot
+    def of(robot: Robot) -> Surfaces:
         """Those of a robot, kept as long as it lives."""
-        if robot not in cls._known:
-            cls._known[robot] = cls(robot)
-        return cls._known[robot]
+        return Surfaces(robot)
 
     def motion(self, links: NDArray[np.intp], before: Array, after: Array) -> Array:
         """(k,) no point of these links (k,) moved farther between two poses (k, 4, 4) [m]."""
@@ -123,6 +117,7 @@ def cached_pairs(
 def most_moved(before: Array, after: Array) -> Array:
     """(k,) no point of a link moved farther between two rows of `Surfaces.sweep` (k, 12) [m]."""
     step = after - before
-    centers, turns = step[:, :3], step[:, 3:]
-    shifted = np.sqrt(np.einsum("ni,ni->n", centers, centers))
-    return np.asarray(shifted + np.sqrt(np.einsum("ni,ni->n", turns, turns)))
+    shifted, turned = (
+        np.sqrt(np.einsum("ni,ni->n", part, part)) for part in (step[:, :3], step[:, 3:])
+    )
+    return np.asarray(shifted + turned)

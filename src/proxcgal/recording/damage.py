@@ -117,8 +117,7 @@ class Contents:
         """Keeps what a record holds; true for the end of the data."""
         stream = ReadDataStream(io.BytesIO(content))
         if opcode == Opcode.HEADER:
-            profile = Header.read(stream).profile
-            if profile != PROFILE:
+            if (profile := Header.read(stream).profile) != PROFILE:
                 raise RecordingError(
                     f"recording {self._path}: an MCAP file, but with the profile {profile!r}, "
                     f"not {PROFILE!r}: not a recording of proxcgal"

@@ -107,13 +107,16 @@ def points_of(message: bytes) -> Points:
 def frame_transforms(time: float, names: Sequence[str], poses_W: Array) -> bytes:
     """foxglove.FrameTransforms of (n, 4, 4) poses."""
     stamp = _time(time)
-    transforms = []
-    for name, T_W in zip(names, poses_W, strict=True):
-        pose = _pose(T_W)
-        transforms.append({
-            "timestamp": stamp, "parent_frame_id": WORLD, "child_frame_id": name,
-            "translation": pose["position"], "rotation": pose["orientation"],
-        })  # fmt: skip
+    transforms = [
+        {
+            "timestamp": stamp,
+            "parent_frame_id": WORLD,
+            "child_frame_id": name,
+            "translation": _vector(T_W[:3, 3]),
+            "rotation": _quaternion(T_W[:3, :3]),
+        }
+        for name, T_W in zip(names, poses_W, strict=True)
+    ]
     return _json(transforms=transforms)
 
 

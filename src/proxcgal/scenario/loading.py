@@ -28,11 +28,10 @@ KINDS: dict[str, type[Scenario]] = {
 
 def list_scenarios() -> dict[str, str]:
     """Names of the built-in scenarios, with a line on each."""
-    listed = {}
-    for path in _built_in():
-        table = toml.parse(path.read_text(encoding="utf-8"), path.name)
-        listed[path.stem] = str(table.get("description", ""))
-    return listed
+    tables = {
+        path.stem: toml.parse(path.read_text(encoding="utf-8"), path.name) for path in _built_in()
+    }
+    return {name: str(table.get("description", "")) for name, table in tables.items()}
 
 
 def load_scenario(name_or_path: str | Path, overrides: Sequence[str] = ()) -> Scenario:

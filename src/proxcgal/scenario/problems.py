@@ -32,11 +32,6 @@ def lines(
     return [f"{what}: {' or '.join(dict.fromkeys(reasons))}" for what, reasons in told.items()]
 
 
-def describe_keys(model: type[BaseModel]) -> dict[str, str]:
-    """Keys of one table, each with what it means."""
-    return {name: field.description or "a table" for name, field in _fields(model).items()}
-
-
 def models_in(annotation: Any) -> Iterator[type[BaseModel]]:
     """The tables inside a type: itself, or what a list or an option holds."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
@@ -72,20 +67,15 @@ def _steps(model: type[BaseModel], loc: Sequence[int | str]) -> list[str]:
         elif (table := next(models_in(place), None)) is not None:
             steps.append(step)
             place = _fields(table)[step].annotation if step in _fields(table) else None
-        elif (values := _values_in(place)) is not None:
+        elif get_origin(place) is dict:
             steps.append(step)
-            place = values
+            place = get_args(place)[1]
     return steps
 
 
 def _fields(model: type[BaseModel]) -> dict[str, FieldInfo]:
     """By the names that the file has for them."""
     return {field.alias or name: field for name, field in model.model_fields.items()}
-
-
-def _values_in(annotation: Any) -> Any:
-    """What a dictionary type holds; None for any other type."""
-    return get_args(annotation)[1] if get_origin(annotation) is dict else None
 
 
 def _sentence(model: type[BaseModel], problem: Any) -> tuple[str, str]:
@@ -109,12 +99,10 @@ def _sentence(model: type[BaseModel], problem: Any) -> tuple[str, str]:
 
 
 def _keys_at(model: type[BaseModel], steps: Sequence[str]) -> dict[str, str]:
-    """Keys of the table at `steps`."""
-    for step in steps:
-        if step.isdigit():
-            continue
+    """Keys of the table at `steps`, each with what it means."""
+    for step in (step for step in steps if not step.isdigit()):
         fields = _fields(model)
         if step not in fields:
             return {}
         model = next(models_in(fields[step].annotation), model)
-    return describe_keys(model)
+    return {name: field.description or "a table" for name, field in _fields(model).items()}

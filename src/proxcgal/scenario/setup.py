@@ -156,9 +156,8 @@ def make_robot(scenario: Scenario) -> Robot:
 
 
 def make_skin(scenario: Scenario, robot: Robot) -> _core.Skin:
-    """The scenario's sensors on this robot. Raises: ConfigError for a link it does not have."""
+    """The scenario's sensors on a robot that `require_fit` has checked."""
     model = _core.SensorModel(**scenario.skin.sensor.model_dump())
-    _require(scenario, _unknown_links(scenario, robot))
     skin = _core.Skin([], model)
     for ring in scenario.skin.fitted:
         height: dict[str, Any] = {} if ring.standoff is None else {"standoff": ring.standoff}
@@ -172,29 +171,14 @@ def make_skin(scenario: Scenario, robot: Robot) -> _core.Skin:
 def require_fit(scenario: Scenario, robot: Robot) -> None:
     """Raises: ConfigError, all that the scenario says of another robot than this, a line each."""
     key, values = scenario.start()
-    unknown = [
-        f"controller.avoid_links.{place} = {link!r}: {_links(robot)}"
-        for place, link in enumerate(scenario.controller.avoid_links)
+    named = {f"skin.rings.{row}.link": ring.link for row, ring in enumerate(scenario.skin.fitted)}
+    avoided = scenario.controller.avoid_links
+    named |= {f"controller.avoid_links.{row}": link for row, link in enumerate(avoided)}
+    problems = posture_problems(robot, values, key) + [
+        f"{place} = {link!r}: {robot.name} has the links {', '.join(robot.link_names)}"
+        for place, link in named.items()
         if link not in robot.link_names
     ]
-    _require(
-        scenario, posture_problems(robot, values, key) + _unknown_links(scenario, robot) + unknown
-    )
-
-
-def _unknown_links(scenario: Scenario, robot: Robot) -> list[str]:
-    return [
-        f"skin.rings.{place}.link = {ring.link!r}: {_links(robot)}"
-        for place, ring in enumerate(scenario.skin.fitted)
-        if ring.link not in robot.link_names
-    ]
-
-
-def _links(robot: Robot) -> str:
-    return f"{robot.name} has the links {', '.join(robot.link_names)}"
-
-
-def _require(scenario: Scenario, problems: Sequence[str]) -> None:
     if problems:
         raise ConfigError("\n".join(f"scenario {scenario.name}: {line}" for line in problems))
 

@@ -1,7 +1,5 @@
 """Scenarios of an arm that a hand guides: taught and played back, or kept off a scene."""
 
-from __future__ import annotations
-
 from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
@@ -71,7 +69,7 @@ class WalkScenario(Scenario):
             {k: v for k, v in self.model_dump(by_alias=True).items() if k not in _OTHERS}
         )
 
-    def slow(self) -> WalkScenario:
+    def slow(self) -> Self:
         """The same path under the hand-guiding rules: bound and wishes at that speed."""
         most = self.hand_guiding_speed
         guard = self.guard.model_copy(update={"tcp_speed": most})

@@ -68,8 +68,7 @@ def arm_followers(names: Sequence[str], solids: Sequence[Solid]) -> list[ArmFoll
 
 
 def _end(pose: Array, along: float) -> Array:
-    end: Array = pose[:3, 3] + along * pose[:3, 2]
-    return end
+    return np.asarray(pose[:3, 3] + along * pose[:3, 2])
 
 
 def _span(pose: Array, low: Array, high: Array) -> None:

@@ -1,13 +1,10 @@
 """Solids of a scene that somebody holds and moves; the others go their own way."""
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from proxcgal.core.typing import Array
 from proxcgal.scene.arm_follower import arm_followers
 from proxcgal.scene.obstacles import Scene
-from proxcgal.scene.solids import Solid
 
 SPEED = 1.0  #: [m/s] at most, of a solid that a hand moves
 
@@ -18,14 +15,10 @@ class DraggedSolids:
     def __init__(self, speed: float = SPEED) -> None:
         """Args: `speed` at most [m/s]."""
         self._speed = speed
-        self._poses: dict[str, Array] = {}
+        #: Where the held solids are, (4, 4) T_WO by name.
+        self.held: dict[str, Array] = {}
         self._wanted: dict[str, Array] = {}
         self._velocity: dict[str, Array] = {}
-
-    @property
-    def held(self) -> Mapping[str, Array]:
-        """Where the held solids are, (4, 4) T_WO by name."""
-        return self._poses
 
     def move(self, name: str, now: Array, wanted: Array) -> None:
         """Takes a solid, where nobody held it, and says where it is to go.
@@ -35,24 +28,23 @@ class DraggedSolids:
             now: (4, 4) T_WO where it is.
             wanted: (4, 4) T_WO; turned at once, moved at bounded speed.
         """
-        self._poses.setdefault(name, np.array(now))
+        self.held.setdefault(name, np.array(now))
         self._wanted[name] = np.array(wanted)
 
     def release(self) -> None:
         """Lets all go: each is again where its own way has it."""
-        for kept in (self._poses, self._wanted, self._velocity):
+        for kept in (self.held, self._wanted, self._velocity):
             kept.clear()
 
     def advance(self, period: float) -> None:
         """Moves what is held for so long [s]."""
         for name, wanted in self._wanted.items():
-            pose = self._poses[name]
-            step = wanted[:3, 3] - pose[:3, 3]
+            place = self.held[name][:3, 3]
+            step = wanted[:3, 3] - place
             far = float(np.linalg.norm(step))
             step *= min(1.0, self._speed * period / max(far, 1e-12))
-            moved = wanted.copy()
-            moved[:3, 3] = pose[:3, 3] + step
-            self._poses[name] = moved
+            self.held[name] = wanted.copy()
+            self.held[name][:3, 3] = place + step
             self._velocity[name] = step / period
 
     def velocity(self, name: str) -> Array:
@@ -70,20 +62,9 @@ class LiveScene:
 
     def __init__(self, scene: Scene, hands: DraggedSolids, since: float = 0.0) -> None:
         """Args: the scene's own time begins at `since` [s]."""
-        self._scene = scene
-        self._hands = hands
-        self._since = since
+        self._scene, self._hands, self._since = scene, hands, since
+        self.names, self.solids = scene.names, scene.solids
         self._arms = arm_followers(scene.names, scene.solids)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Of the scene."""
-        return self._scene.names
-
-    @property
-    def solids(self) -> tuple[Solid, ...]:
-        """Of the scene."""
-        return self._scene.solids
 
     def poses(self, time: float) -> Array:
         """(n, 4, 4) T_WO."""

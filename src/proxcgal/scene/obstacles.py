@@ -1,18 +1,15 @@
 """What stands and moves beside the robot: solids, where they are, and how fast."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Protocol
+from dataclasses import dataclass
+from typing import ClassVar, Protocol
 
 import numpy as np
 
 from proxcgal.core.transforms import placed
 from proxcgal.core.typing import Array
+from proxcgal.scene.obstacle_keys import Obstacle
 from proxcgal.scene.solids import Solid
-
-if TYPE_CHECKING:
-    from proxcgal.scene.obstacle_keys import Obstacle
 
 
 class Scene(Protocol):
@@ -116,11 +113,12 @@ class KnownCloud:
 
     def velocities(self, time: float) -> Array:
         """(n, 3) of the same points in world [m/s]."""
-        parts = [np.empty((0, 3))]
         poses, twists = self._scene.poses(time), self._scene.twists(time)
-        for points_O, T_WO, twist in zip(self._points_O, poses, twists, strict=True):
-            parts.append(twist[:3] + np.cross(twist[3:], points_O @ T_WO[:3, :3].T))
-        return np.concatenate(parts)
+        parts = [
+            twist[:3] + np.cross(twist[3:], points_O @ T_WO[:3, :3].T)
+            for points_O, T_WO, twist in zip(self._points_O, poses, twists, strict=True)
+        ]
+        return np.concatenate([np.empty((0, 3)), *parts])
 
     def _placed(self, time: float) -> Array:
         parts = [
@@ -130,26 +128,24 @@ class KnownCloud:
         return np.concatenate([*parts, np.empty((0, 3))])
 
 
+@dataclass(frozen=True, slots=True, eq=False)
 class FixedCloud:
     """Known points that stand still, such as a recording holds."""
 
-    still = True
-
-    def __init__(self, points_W: Array) -> None:
-        """Args: `points_W` (n, 3) [m]."""
-        self._points_W = points_W
+    points_W: Array  #: (n, 3) [m]
+    still: ClassVar[bool] = True
 
     def __len__(self) -> int:
         """How many points."""
-        return len(self._points_W)
+        return len(self.points_W)
 
     def __call__(self, time: float) -> Array:
         """(n, 3) in world [m]."""
-        return self._points_W
+        return self.points_W
 
     def velocities(self, time: float) -> Array:
         """(n, 3) zeros [m/s]."""
-        return np.zeros_like(self._points_W)
+        return np.zeros_like(self.points_W)
 
 
 Cloud = KnownCloud | FixedCloud

@@ -28,11 +28,7 @@ class _Sharp:
     """A shape whose core is its surface."""
 
     __slots__ = ()
-
-    @property
-    def rounding(self) -> float:
-        """[m] between core and surface."""
-        return 0.0
+    rounding = 0.0  #: [m] between core and surface
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,8 +154,7 @@ class _Rounded:
         center = np.array([0.0, 0.0, np.clip(point_O[2], -half, half)])
         apart = np.asarray(point_O) - center
         far = float(np.linalg.norm(apart))
-        nearest: Array = center + apart * min(self.radius / max(far, _THIN), 1.0)
-        return nearest
+        return np.asarray(center + apart * min(self.radius / max(far, _THIN), 1.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,5 +189,4 @@ def _ring(radius: float, spacing: float) -> Array:
 
 def _tube(radius: float, heights: Array, spacing: float) -> Array:
     ring = _ring(radius, spacing)
-    rings = [np.column_stack([ring, np.full(len(ring), z)]) for z in heights]
-    return np.concatenate(rings)
+    return np.concatenate([np.column_stack([ring, np.full(len(ring), z)]) for z in heights])

@@ -74,21 +74,21 @@ def problems_of(
         robot: whose joint limits hold.
         configurations: to begin from, by name.
     """
-    problems: list[str] = []
-    for name, values in (("translation", goal.translation), ("rpy", goal.rpy)):
-        if values is None and name == "rpy":
-            continue
-        if problem := _three(name, values):
-            problems.append(problem)
+    wrong = (
+        _three("translation", goal.translation),
+        None if goal.rpy is None else _three("rpy", goal.rpy),
+    )
+    problems = [problem for problem in wrong if problem is not None]
     if goal.frame not in FRAMES:
         problems.append(f"frame = {goal.frame!r}: must be one of {', '.join(FRAMES)}")
     if goal.init:
         q = configurations.get(goal.init) if isinstance(goal.init, str) else None
-        if q is None:
-            problems.append(f"init = {goal.init!r}: there are {', '.join(configurations)}")
-        else:
-            outside = posture_problems(robot, q, goal.init)
-            problems += [f"init = {goal.init!r}: {line}" for line in outside]
+        outside = (
+            [f"there are {', '.join(configurations)}"]
+            if q is None
+            else posture_problems(robot, q, goal.init)
+        )
+        problems += [f"init = {goal.init!r}: {line}" for line in outside]
     return problems
 
 

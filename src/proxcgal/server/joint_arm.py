@@ -7,7 +7,6 @@ import numpy as np
 
 from proxcgal.core.modes import STOP
 from proxcgal.core.typing import Array
-from proxcgal.models.macro_micro import tool_jacobian
 from proxcgal.models.robots import Robot
 from proxcgal.scenario.joint_scenario import JointScenario
 from proxcgal.scenario.loading import change_scenario
@@ -24,16 +23,14 @@ class JointArm:
     def __init__(self, scenario: JointScenario, robot: Robot | None) -> None:
         """At rest in the first initial configuration. Raises: ProxError, what does not fit."""
         self.setup = Setup.of(scenario, robot)  #: with the goal that is followed
+        self.robot = self.setup.robot
         self.time = 0.0  #: [s]
         self.last: TickResult | None = None  #: of the controller's last tick
         self._cloud = self.setup.known_cloud()
         self._start(self.setup.q0)
-        self._goal = self._held = self.tool
-
-    @property
-    def robot(self) -> Robot:
-        """The robot."""
-        return self.setup.robot
+        #: (4, 4) where the tool is to stay in the ticks that follow no goal.
+        self.held = self.tool
+        self._goal = self.held
 
     @property
     def scenario(self) -> JointScenario:
@@ -65,7 +62,7 @@ class JointArm:
     @property
     def tool_velocity(self) -> Array:
         """(6,) [m/s] and [rad/s] in world, as commanded."""
-        return tool_jacobian(self.robot, self.q) @ self.qd
+        return np.asarray(self.robot.tool_jacobian(self.q) @ self.qd)
 
     @property
     def resting(self) -> bool:
@@ -107,17 +104,13 @@ class JointArm:
         """A goal (4, 4) for the ticks that follow one."""
         self.setup = replace(self.setup, goals=(T_WT,))
 
-    def hold(self, T_WT: Array) -> None:
-        """Where the tool is to stay (4, 4) in the ticks that follow no goal."""
-        self._held = T_WT
-
     def move(self) -> None:
         """By the last command, for one period."""
         self._actuation.step()
 
     def tick(self, *, following: bool) -> None:
         """The next command: towards the goal, or to hold the tool."""
-        self._goal = self.setup.goal if following else self._held
+        self._goal = self.setup.goal if following else self.held
         _, self.last = next(self._loop)
         self._ticks += 1
         self.time += self.period

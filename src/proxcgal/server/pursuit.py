@@ -54,7 +54,7 @@ class JointPursuit:
         active = self._goals.active
         following = active is not None and active.state == "executing" and not active.over
         if active is not None and not active.over and not following:
-            arm.hold(T_WT)  # nothing is asked of the tool: it comes to rest
+            arm.held = T_WT  # nothing is asked of the tool: it comes to rest
         arm.tick(following=following)
 
     def _advance(self, active: PursuedGoal, T_WT: Array, *, wait: bool) -> None:
@@ -84,7 +84,7 @@ class JointPursuit:
         if ending.outcome == "succeeded" or last is None:
             self.end(ending.outcome, ending.reason)
             if ending.outcome == "succeeded" and active.T_WT is not None:
-                arm.hold(active.T_WT)
+                arm.held = active.T_WT
             return
         if active.T_WT is not None:  # of the tick that the reason is about
             active.remain = pose_errors(arm.tool, active.T_WT)
@@ -100,7 +100,7 @@ class JointPursuit:
             found = active.ending or ending
             self.end(found.outcome, found.reason, active.remain)
             return
-        arm.hold(arm.tool)  # it stays where it was given up
+        arm.held = arm.tool  # it stays where it was given up
         active.over = True
         threading.Thread(target=judge, daemon=True).start()
 
@@ -114,7 +114,7 @@ class JointPursuit:
         """
         active = self._goals.active
         assert active is not None
-        self._arm.hold(self._arm.tool)
+        self._arm.held = self._arm.tool
         self._goals.end(outcome, reason, self._arm.time, remain or self.errors(active))
 
     def errors(self, active: PursuedGoal) -> tuple[float, float]:

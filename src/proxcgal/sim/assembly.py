@@ -1,9 +1,8 @@
 """The parts of one run, assembled: controller, injected faults, world, source, known points."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Self
 
 from proxcgal import _core
 from proxcgal.core.errors import ConfigError
@@ -41,7 +40,7 @@ class Assembly:
         controller: str,
         seed: int | None = None,
         make_source: MakeSource = SimulatedSource,
-    ) -> Assembly:
+    ) -> Self:
         """Makes every part.
 
         Args:

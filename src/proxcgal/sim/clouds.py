@@ -30,8 +30,7 @@ def without(points: Array, some: Array) -> Array:
     """Those rows of (n, 3) that are not among the rows of `some`, bit for bit."""
     if not len(points) or not len(some):
         return points
-    left: Array = points[~np.isin(_rows(points), _rows(some))]
-    return left
+    return np.asarray(points[~np.isin(_rows(points), _rows(some))])
 
 
 def _rows(points: Array) -> NDArray[np.void]:

@@ -1,6 +1,4 @@
-"""Faults put between the world and the controller, as the scenario's `[[fault]]` tables say."""
-
-from __future__ import annotations
+"""Faults of scans, of the tick's other inputs and of mounts, as the `[[fault]]` tables say."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -9,11 +7,14 @@ import numpy as np
 
 from proxcgal import _core
 from proxcgal.core.errors import ConfigError
+from proxcgal.core.transforms import rotation_from_vector
+from proxcgal.core.typing import Array
+from proxcgal.models.robots import Robot
 from proxcgal.scenario.fault_keys import FAULT_VALUES, INPUT_FAULTS, MOUNT_FAULTS, Fault
 from proxcgal.sim.range_sensor import NO_TARGET, VALID, ZONES
 from proxcgal.sim.tick import TickInput
 
-_STREAM = 2  # of the seed; the sensors' noise draws from another
+_STREAM, _MOUNT_STREAM = 2, 3  # of the seed; the sensors' noise draws from another
 
 
 class FaultInjector:
@@ -35,7 +36,7 @@ class FaultInjector:
         """
         problems = []
         self._faults: list[_Injected] = []
-        self._inputs: list[Fault] = [fault for fault in faults if fault.kind in INPUT_FAULTS]
+        self._inputs = [fault for fault in faults if fault.kind in INPUT_FAULTS]
         for place, fault in enumerate(faults):
             if fault.kind in INPUT_FAULTS:
                 continue
@@ -84,12 +85,9 @@ class _Injected:
     """One fault with what it remembers."""
 
     def __init__(self, fault: Fault, rows: frozenset[int], key: tuple[int, ...]) -> None:
-        self._kind = fault.kind
-        self._start = fault.start
-        self._end = np.inf if fault.end is None else fault.end
-        self._value = value_of(fault)
-        self._rows = rows
-        self._key = key
+        self._kind, self._value = fault.kind, value_of(fault)
+        self._start, self._end = fault.start, np.inf if fault.end is None else fault.end
+        self._rows, self._key = rows, key
         self._last: dict[int, _core.Scan] = {}
         self._waiting: list[_core.Scan] = []
         self._held: dict[int, _core.Scan] = {}
@@ -160,3 +158,57 @@ def rows_of(fault: Fault, names: Sequence[str]) -> frozenset[int] | None:
     if isinstance(sensor, int):
         return frozenset([sensor]) if 0 <= sensor < len(names) else None
     return frozenset([names.index(sensor)]) if sensor in names else None
+
+
+class RealMounts:
+    """The sensors' mounts in the world, which `mount_` faults move from where they should be."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        mounts: Sequence[_core.Mount],
+        faults: Sequence[Fault] = (),
+        seed: int = 0,
+    ) -> None:
+        """Resolves the faults.
+
+        Args:
+            robot: that carries the sensors.
+            mounts: as the controller has them.
+            faults: of the scenario, whatever kind.
+            seed: of the run.
+        """
+        self._robot, links = robot, list(robot.link_names)
+        self._links = np.array([links.index(mount.link) for mount in mounts], np.intp)
+        self._T_LS: Array = np.array([mount.T_LS for mount in mounts]).reshape(-1, 4, 4)
+        names = [mount.name for mount in mounts]
+        self._moved: list[tuple[Fault, int, Array]] = []
+        for place, fault in enumerate(faults):
+            if fault.kind not in MOUNT_FAULTS:
+                continue
+            for row in sorted(rows_of(fault, names) or ()):
+                drawn = np.random.default_rng([seed, _MOUNT_STREAM, place, row]).standard_normal(3)
+                axis = np.eye(3)["xyz".index(fault.axis)] if fault.axis else drawn
+                by = value_of(fault) * axis / np.linalg.norm(axis)
+                T_SS = np.eye(4)
+                if fault.kind == "mount_offset":
+                    T_SS[:3, 3] = by
+                else:
+                    T_SS[:3, :3] = rotation_from_vector(by)
+                self._moved.append((fault, row, T_SS))
+
+    def poses_W(  # noqa: N802  a frame's suffix
+        self, q: Array, time: float, rows: Sequence[int] | slice = slice(None)
+    ) -> Array:
+        """(k, 4, 4) T_WS of these sensors at a posture (n_q,) and a time of the run [s]."""
+        return np.asarray(self._robot.link_poses(q)[self._links[rows]] @ self.at(time)[rows])
+
+    def at(self, time: float) -> Array:
+        """(n, 4, 4) T_LS of every sensor at that time of the run."""
+        if not self._moved:
+            return self._T_LS
+        T_LS = self._T_LS.copy()
+        for fault, row, T_SS in self._moved:
+            if fault.start <= time and (fault.end is None or time < fault.end):
+                T_LS[row] = T_LS[row] @ T_SS
+        return T_LS

@@ -99,20 +99,17 @@ class Physics:
     @property
     def tool_W(self) -> Array:  # noqa: N802  a frame's suffix
         """(3,) origin of the tool [m]; a view."""
-        position: Array = self._data.site_xpos[self._tool]
-        return position
+        return np.asarray(self._data.site_xpos[self._tool])
 
     @property
     def tool_R(self) -> Array:  # noqa: N802  a rotation
         """(3, 3) R_WT; a view."""
-        rotation: Array = self._data.site_xmat[self._tool].reshape(3, 3)
-        return rotation
+        return np.asarray(self._data.site_xmat[self._tool].reshape(3, 3))
 
     @property
     def acceleration(self) -> Array:
         """(n_q,) of the last step [rad/s^2]; a view."""
-        found: Array = self._data.qacc
-        return found
+        return np.asarray(self._data.qacc)
 
     def tool_twist(self) -> Array:
         """(6,) of the tool's origin, linear first, in world [m/s], [rad/s]."""
@@ -201,10 +198,9 @@ class Physics:
         """Computed torque: a = ramp of the command + 2 w (qd error) + w^2 (q error)."""
         model, data = self._model, self._data
         self._target += self._period * command
-        stiffness = _DRIVE_FREQUENCY**2
         wanted = (command - self._command) / self._period
         wanted += 2.0 * _DRIVE_FREQUENCY * (command - data.qvel)
-        wanted += stiffness * (self._target - data.qpos)
+        wanted += _DRIVE_FREQUENCY**2 * (self._target - data.qpos)
         self._command[:] = command
         mujoco.mj_mulM(model, data, self._inertia, wanted)
         data.qfrc_applied[:] = _MODEL_MASS * self._inertia

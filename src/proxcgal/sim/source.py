@@ -9,7 +9,7 @@ from proxcgal import _core
 from proxcgal.core.typing import Array, Bools
 from proxcgal.scenario.setup import Setup
 from proxcgal.sim.actuation import Actuation
-from proxcgal.sim.mount_faults import RealMounts
+from proxcgal.sim.faults import RealMounts
 from proxcgal.sim.range_sensor import ZONES, RangeModel
 from proxcgal.sim.tick import TickInput
 from proxcgal.sim.waypoints import Waypoints
@@ -82,10 +82,11 @@ class SimulatedSource:
         assert self._world is not None
         rows = list(range(len(self._scans)))
         hits = self._cast(rows, 0.0, self._setup.q0)
-        sent = []
-        for index in range(_BEFORE, _BEFORE + scans):
-            sent += self._scans_of(rows, index, 0.0, hits)
-        return sent
+        return [
+            scan
+            for index in range(_BEFORE, _BEFORE + scans)
+            for scan in self._scans_of(rows, index, 0.0, hits)
+        ]
 
     def read(self) -> TickInput | None:
         """Moves the arm by the last command and collects the scans made on the way."""
@@ -104,8 +105,7 @@ class SimulatedSource:
             rows = [int(row) for row in np.flatnonzero(stamps == stamp)]
             scans += self._measure(rows, stamp, self._arm.within_step(stamp - start))
         self._tick += 1
-        tool_W = np.asarray(self._setup.robot.tool_pose(self.q))[:3, 3]
-        goal = self._waypoints.at(time, tool_W)
+        goal = self._waypoints.at(time, np.asarray(self._setup.robot.tool_pose(self.q))[:3, 3])
         return TickInput(time, self.q, goal, tuple(scans), self._world is None)
 
     def command(self, qd: Array) -> None:

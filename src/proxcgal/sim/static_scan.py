@@ -74,19 +74,21 @@ def _placed(setup: Setup, inputs: TickInput, kept: Bools) -> StaticScan:
     settings, model = setup.scenario.controller.filter, setup.skin.model
     poses_W = np.asarray(setup.robot.link_poses(inputs.q))
     links = setup.robot.link_names
-    origins, points, tolerances, environment = [], [], [], []
+    parts = []
     for scan in inputs.scans:
         mount = setup.skin.mounts[scan.sensor]
         T_WS = poses_W[links.index(mount.link)] @ np.asarray(mount.T_LS)
         zones, points_S, _, sigma = (np.asarray(part) for part in _core.sense(model, scan))
         points_W = points_S @ T_WS[:3, :3].T + T_WS[:3, 3]
         above = points_W[:, 2] >= settings.z_min
-        points.append(points_W[above])
-        origins.append(np.tile(T_WS[:3, 3], (len(points[-1]), 1)))
-        tolerances.append(np.maximum(settings.tolerance, settings.sigmas * sigma[above]))
-        environment.append(kept[scan.sensor, zones[above]])
-    return StaticScan(
-        setup=setup, scans=inputs.scans, origins_W=np.concatenate(origins),
-        points_W=np.concatenate(points), tolerance=np.concatenate(tolerances),
-        environment=np.concatenate(environment),
-    )  # fmt: skip
+        parts.append((
+            np.tile(T_WS[:3, 3], (int(above.sum()), 1)),
+            points_W[above],
+            np.maximum(settings.tolerance, settings.sigmas * sigma[above]),
+            kept[scan.sensor, zones[above]],
+        ))  # fmt: skip
+    columns: dict[str, Any] = {
+        name: np.concatenate(column)
+        for name, column in zip(_BY_POINT, zip(*parts, strict=True), strict=True)
+    }
+    return StaticScan(setup=setup, scans=inputs.scans, **columns)

@@ -3,9 +3,8 @@
 The same three records are logged, written, read back and compared.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
+from typing import Self
 
 import numpy as np
 
@@ -74,7 +73,7 @@ class TickResult:
     @classmethod
     def of(
         cls, out: _core.TickOutput, cloud_points: int, tick_us: float, cpu_us: float = 0.0
-    ) -> TickResult:
+    ) -> Self:
         """Copies the controller's answer."""
         pair = out.pair
         return cls(
@@ -103,7 +102,7 @@ class TickResult:
             cpu_us=cpu_us,
         )
 
-    def same(self, other: TickResult) -> bool:
+    def same(self, other: Self) -> bool:
         """Bit for bit, the time it took apart; equal NaNs count as the same."""
         return repr(self._compared()) == repr(other._compared())
 

@@ -12,7 +12,6 @@ import copy
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import mujoco
 import numpy as np
@@ -20,7 +19,7 @@ from numpy.typing import NDArray
 
 from proxcgal.core.errors import SimulationError
 from proxcgal.core.typing import Array, Bools
-from proxcgal.models.robots import Robot
+from proxcgal.models.robots import Robot, once_per_robot
 from proxcgal.models.surfaces import Surfaces
 from proxcgal.scene.obstacles import Scene
 from proxcgal.scene.solids import Box, CapsuleSolid, Cylinder, Solid, Sphere
@@ -94,11 +93,11 @@ class World:
         Raises:
             SimulationError: `q` gives no finite pose, or MuJoCo warned.
         """
-        poses = self._robot.link_poses(q)
-        if not np.isfinite(poses).all():
+        poses_W = np.asarray(self._robot.link_poses(q))
+        if not np.isfinite(poses_W).all():
             raise SimulationError(f"the arm has no finite pose at q = {np.asarray(q).tolist()}")
-        self._poses_W = np.asarray(poses)
-        self._put(0, poses)
+        self._poses_W = poses_W
+        self._put(0, poses_W)
         if self._scene is not None and not self._scene.still:
             self._place_scene(time)
         mujoco.mj_kinematics(self._model, self._data)
@@ -128,14 +127,14 @@ class World:
         return Hits(np.minimum(own, scene), own < scene)
 
     def _cast_at_scene(self, origins_W: Array, directions: Array, start: float) -> Array:
-        bundles, n = directions.shape[:2]
-        length, geom = np.full((bundles, n), -1.0), np.empty((bundles, n), np.int32)
+        shape = directions.shape[:2]
         if self._scene is None or not self._scene.solids:
-            return np.full((bundles, n), np.inf)
+            return np.full(shape, np.inf)
+        length, geom = np.full(shape, -1.0), np.empty(shape, np.int32)
         for row, origin in enumerate(origins_W):
             mujoco.mj_multiRay(
                 self._model, self._data, origin, directions[row].ravel(), _CAST_GROUP, True, -1,
-                geom[row], length[row], None, n, mujoco.mjMAXVAL,
+                geom[row], length[row], None, shape[1], mujoco.mjMAXVAL,
             )  # fmt: skip
         found = np.empty(1, np.int32)
         for row, ray in np.argwhere((length >= 0.0) & (length < start)):
@@ -205,18 +204,6 @@ class World:
             self._data.mocap_quat[row] = _quaternion(pose[:3, :3])
 
 
-_Shapes = tuple[type[Solid], ...]
-_models: WeakKeyDictionary[Robot, dict[_Shapes, Any]] = WeakKeyDictionary()
-
-
-def _compiled(robot: Robot, shapes: _Shapes) -> Any:
-    """The robot's links and solids of no particular size; made once for each."""
-    known = _models.setdefault(robot, {})
-    if shapes not in known:
-        known[shapes] = _compile(robot, shapes)
-    return known[shapes]
-
-
 def _size(solid: Solid) -> tuple[float, ...]:
     """As MuJoCo has it: three numbers, whatever the shape."""
     if isinstance(solid, Box):
@@ -227,7 +214,9 @@ def _size(solid: Solid) -> tuple[float, ...]:
     return solid.radius, 0.5 * height, 0.0
 
 
-def _compile(robot: Robot, shapes: _Shapes) -> Any:
+@once_per_robot
+def _compiled(robot: Robot, shapes: tuple[type[Solid], ...]) -> Any:
+    """The robot's links and solids of no particular size; made once for each."""
     spec = mujoco.MjSpec()
     spec.option.disableflags = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     for row, name in enumerate(robot.link_names):

@@ -19,9 +19,9 @@ from proxcgal.scene.dragging import DraggedSolids, LiveScene
 from proxcgal.sim.clouds import Clouds
 from proxcgal.sim.moment import Moment
 from proxcgal.sim.tick import TickInput, TickResult
-from proxcgal.trial.assembly import assemble
+from proxcgal.trial.trial import assemble
 from proxcgal.trial.walkthrough.guided_source import GuidedSource
-from proxcgal.trial.walkthrough.interactive_hand import HAND
+from proxcgal.trial.walkthrough.operator_hand import HAND
 
 _ENDLESS = 1e7  # [s]
 

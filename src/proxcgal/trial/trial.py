@@ -15,16 +15,31 @@ from proxcgal.evaluation.stall_diagnosis import concluded
 from proxcgal.evaluation.termination import Ending, GoalWatch
 from proxcgal.evaluation.trial_log import TOO_CLOSE, TrialLog, final_ticks, sampled_ticks
 from proxcgal.models.robots import Robot
-from proxcgal.recording.replay import first_difference, recompute
 from proxcgal.recording.trial_recorder import TrialRecorder
 from proxcgal.recording.writer import Recorder
-from proxcgal.scenario.scenario import CONTROLLERS, Scenario
+from proxcgal.scenario.scenario import Scenario
 from proxcgal.scenario.setup import Setup
+from proxcgal.scenario.walkthrough_scenario import GuidedScenario
 from proxcgal.sim.assembly import Assembly
+from proxcgal.sim.source import SimulatedSource
 from proxcgal.sim.tick import Tick, TickResult, TickTruth
-from proxcgal.trial.assembly import assemble
+from proxcgal.trial.walkthrough.guided_source import GuidedSource
 
-__all__ = ["CONTROLLERS", "TrialLog", "first_difference", "recompute", "run_trial"]
+
+def assemble(setup: Setup, controller: str, seed: int | None = None) -> Assembly:
+    """Makes the controller, its faults, world and source.
+
+    Args:
+        setup: of the scenario.
+        controller: one of CONTROLLERS.
+        seed: instead of the scenario's.
+
+    Raises:
+        ConfigError: an unknown controller or sensor, a setting out of bounds.
+        SimulationError: MuJoCo refuses the scene.
+    """
+    guided = isinstance(setup.scenario, GuidedScenario)
+    return Assembly.of(setup, controller, seed, GuidedSource if guided else SimulatedSource)
 
 
 def run_trial(
@@ -101,11 +116,10 @@ def _simulate(
         q, elapsed = run.source.q, len(ticks) * period
         leaked = 0 if run.known is not None else _leaked(run)
         true = NOT_ASKED if truth is None else truth(q, elapsed)
-        tick = Tick(inputs, result, TickTruth(true.distance, true.link, true.own, leaked))
-        ticks.append(tick)
+        ticks.append(Tick(inputs, result, TickTruth(true.distance, true.link, true.own, leaked)))
         postures.append(q)
         if record is not None:
-            record.write(tick, elapsed, q)
+            record.write(ticks[-1], elapsed, q)
         if len(ticks) % beat == 0:
             on_progress(min(len(ticks) * period / scenario.duration, 1.0))
         if watch is not None:
@@ -132,10 +146,11 @@ def _with_truth(
 ) -> list[Tick]:
     """The ticks with the true distances that are wanted or decide."""
     asked = sparse_ground_truth(setup.robot, setup.measured, elapsed, q, wanted, under=TOO_CLOSE)
-    columns = zip(ticks, asked.distance, asked.link, asked.own, strict=True)
     return [
         replace(tick, truth=TickTruth(float(distance), link, float(own), tick.truth.leaked))
-        for tick, distance, link, own in columns
+        for tick, distance, link, own in zip(
+            ticks, asked.distance, asked.link, asked.own, strict=True
+        )
     ]
 
 

@@ -7,7 +7,7 @@ import viser
 import viser.transforms
 
 from proxcgal.sim.moment import Posed
-from proxcgal.trial.walkthrough.interactive_hand import HAND
+from proxcgal.trial.walkthrough.operator_hand import HAND
 from proxcgal.viewer.access import AccessControl
 from proxcgal.viewer.allowed_controls import AllowedControls
 from proxcgal.viewer.command_queue import ROOM, CommandQueue

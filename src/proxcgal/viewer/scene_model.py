@@ -12,7 +12,7 @@ from proxcgal.models.robots import Robot
 from proxcgal.scenario.setup import Setup
 from proxcgal.scene.solids import CapsuleSolid, Solid
 from proxcgal.trial.walkthrough.interactive import WalkTrial
-from proxcgal.trial.walkthrough.interactive_hand import HAND
+from proxcgal.trial.walkthrough.operator_hand import HAND
 
 OPERATOR = "operator"  #: the capsule that rides on the tool
 

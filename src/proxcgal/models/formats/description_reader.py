@@ -2,22 +2,24 @@
 
 import os
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from proxcgal.core.cache import Cache
+import numpy as np
+
+from proxcgal.core.cache import Cache, Stored, hash_file
 from proxcgal.core.errors import ModelError, ProxError
-from proxcgal.models.description import RobotDescription
+from proxcgal.models.description import Frame, Joint, Link, RobotDescription
 from proxcgal.models.formats import mjcf, urdf
 from proxcgal.models.formats.capsule_robot import read_capsule_robot
-from proxcgal.models.formats.description_cache import description_from, description_to
 from proxcgal.models.formats.paths import ROBOT_SUFFIXES, MeshFolders, is_robot_file
 from proxcgal.models.formats.pinocchio_model import WORLD, describe
 from proxcgal.models.formats.safe_xml import parse_xml
 
 # Bump when what is read from the same files changes.
 _VERSION = 1
+_LIMITS = ("q_min", "q_max", "qd_max", "qdd_max")
 
 
 def read_description(
@@ -132,3 +134,71 @@ def _expand(path: Path, folders: MeshFolders) -> tuple[ET.Element, list[Path]]:
     except Exception as error:  # xacro raises what the expressions in it raise
         raise ModelError(f"{path}: xacro: {error}") from None
     return ET.fromstring(text), files
+
+
+def description_to(description: RobotDescription, files: Iterable[Path]) -> Stored:
+    """The entry that `description_from` reads; valid while the files stay as they are."""
+    joints, links, frames = description.joints, description.links, description.frames
+    arrays = {
+        "origin": np.array([j.origin for j in joints]),
+        "axis": np.array([j.axis for j in joints]),
+        "limits": np.array([[getattr(j, name) for name in _LIMITS] for j in joints]),
+        "T_JL": np.array([link.T_JL for link in links]),
+        "T_JF": np.array([f.T_JF for f in frames]),
+    }
+    for row, link in enumerate(links):
+        arrays[f"v{row}"], arrays[f"f{row}"] = link.vertices_L, link.triangles
+    meta = {
+        "files": {str(file): hash_file(file) for file in set(files)},
+        "name": description.name,
+        "tool": description.tool,
+        "source": description.source,
+        "joints": [[j.name, j.type, j.parent] for j in joints],
+        "links": [[link.name, link.joint, link.dropped_faces] for link in links],
+        "frames": [[f.name, f.joint] for f in frames],
+    }
+    return Stored(arrays, meta)
+
+
+def description_from(entry: Stored) -> RobotDescription | None:
+    """The description kept in an entry, or None where one of its files has changed."""
+    arrays, meta = entry.arrays, entry.meta
+    try:
+        if any(hash_file(Path(file)) != known for file, known in meta["files"].items()):
+            return None
+        joints = tuple(
+            Joint(
+                name=name,
+                type=kind,
+                parent=parent,
+                origin=arrays["origin"][i],
+                axis=arrays["axis"][i],
+                **dict(zip(_LIMITS, arrays["limits"][i].tolist(), strict=True)),
+            )
+            for i, (name, kind, parent) in enumerate(meta["joints"])
+        )
+        links = tuple(
+            Link(
+                name=name,
+                joint=joint,
+                T_JL=arrays["T_JL"][i],
+                vertices_L=arrays[f"v{i}"],
+                triangles=arrays[f"f{i}"],
+                dropped_faces=dropped,
+            )
+            for i, (name, joint, dropped) in enumerate(meta["links"])
+        )
+        frames = tuple(
+            Frame(name=name, joint=joint, T_JF=arrays["T_JF"][i])
+            for i, (name, joint) in enumerate(meta["frames"])
+        )
+        return RobotDescription(
+            name=meta["name"],
+            joints=joints,
+            links=links,
+            frames=frames,
+            tool=meta["tool"],
+            source=meta["source"],
+        )
+    except (OSError, KeyError, IndexError, TypeError, ValueError):
+        return None

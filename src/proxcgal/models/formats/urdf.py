@@ -119,9 +119,10 @@ def _check_joint(element: ET.Element, name: str, path: Path) -> None:
         if kind != "continuous":
             raise ModelError(f"{what} is {kind} and has no <limit>; lower and upper are needed")
         return
-    for key in ("lower", "upper", "velocity"):
+    lower, upper, _ = (
         parse_number(limit.get(key, "0"), f"{what}, limit {key}", math.inf)
-    lower, upper = (float(limit.get(key, "0")) for key in ("lower", "upper"))
+        for key in ("lower", "upper", "velocity")
+    )
     if kind != "continuous" and not lower < upper:
         raise ModelError(f"{what} has lower limit {lower} and upper limit {upper}; lower < upper")
 
@@ -142,9 +143,8 @@ def kinematics_only(root: ET.Element) -> str:
             limit = joint.find("limit")
             given = {} if limit is None else limit.attrib
             # Speed and effort are not taken from pinocchio, whose parser would complain by itself.
-            values = {"velocity": "0", "effort": "0"}
-            values |= {key: value for key, value in given.items() if key in ("lower", "upper")}
-            ET.SubElement(kept, "limit", values)
+            bounds = {key: value for key, value in given.items() if key in ("lower", "upper")}
+            ET.SubElement(kept, "limit", {"velocity": "0", "effort": "0", **bounds})
     return ET.tostring(out, encoding="unicode")
 
 

@@ -16,10 +16,10 @@ from proxcgal.core.typing import Array, Bools, Ints
 from proxcgal.models.mesh.quadrics import cost, minimum, surface_quadrics
 from proxcgal.models.mesh.triangles import (
     compact,
-    cross,
     dot,
     double_areas,
     edges_of,
+    face_vectors,
     faces_per_vertex,
     gather,
     point_triangle_distance,
@@ -82,13 +82,12 @@ class _Surface:
             rows = rows[self._keeps_faces(edges[rows], place[rows], start, face_of)]
         rows = rows[np.argsort(key[rows], kind="stable")][: max(50, int(_TAKEN * len(rows)))]
         rows = rows[self._independent(edges[rows])][: self.count - count]
+        tried = len(rows)
         if np.isfinite(self.tolerance):
             near, moved, home = self._keeps_points(edges[rows], place[rows], start, face_of)
             self.blocked = np.append(self.blocked, edges[rows[~near]] @ np.array([n, 1]))
             self.home[moved] = home
-            tried, rows = len(rows), rows[near]
-        else:
-            tried = len(rows)
+            rows = rows[near]
         self._collapse(edges[rows], place[rows])
         return tried, len(rows)
 
@@ -142,7 +141,7 @@ class _Surface:
             edge, corners, moved, _ = self._ring(edges, end, start, face_of)
             before = self.v[corners]
             after = np.where(moved[..., None], place[edge][:, None, :], before)
-            n0, n1 = _face_vectors(before), _face_vectors(after)
+            n0, n1 = face_vectors(before), face_vectors(after)
             l0, l1 = np.sqrt(dot(n0, n0)), np.sqrt(dot(n1, n1))
             aspect0, aspect1 = l0 / _longest(before) ** 2, l1 / _longest(after) ** 2
             bad = dot(n0, n1) < _MIN_NORMAL_DOT * l0 * l1
@@ -286,10 +285,6 @@ def decimate(
         elif not done:
             break
     return compact(surface.v, surface.f)
-
-
-def _face_vectors(p: Array) -> Array:
-    return cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
 
 
 def _longest(p: Array) -> Array:

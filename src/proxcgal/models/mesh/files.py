@@ -38,16 +38,13 @@ def load_mesh(path: str | os.PathLike[str]) -> tuple[Array, Ints]:
     if suffix not in MESH_SUFFIXES:
         raise GeometryError(f"{path}: not a mesh file; {', '.join(MESH_SUFFIXES)} are read")
     try:
-        size = path.stat().st_size
-        if size > MAX_MESH_BYTES:
+        if (size := path.stat().st_size) > MAX_MESH_BYTES:
             raise GeometryError(f"{path}: {size} bytes; at most {MAX_MESH_BYTES} are read")
         data = path.read_bytes()
     except OSError as error:
         raise GeometryError(f"{path}: cannot be read: {error.strerror}") from None
-    if suffix == ".obj":
-        vertices, triangles = _read_obj(data, path)
-    else:
-        vertices, triangles = _read_with_trimesh(data, path)
+    read = _read_obj if suffix == ".obj" else _read_with_trimesh
+    vertices, triangles = read(data, path)
     check_mesh(vertices, triangles, str(path))
     return vertices, triangles
 
@@ -68,14 +65,12 @@ def check_mesh(vertices: Array, triangles: Ints, what: str) -> None:
         raise GeometryError(f"{what}: no triangles")
     if len(triangles) > MAX_FACES:
         raise GeometryError(f"{what}: {len(triangles)} faces; at most {MAX_FACES} are taken")
-    outside = (triangles < 0) | (triangles >= len(vertices))
-    if outside.any():
+    if (outside := (triangles < 0) | (triangles >= len(vertices))).any():
         face, corner = np.argwhere(outside)[0]
         raise GeometryError(
             f"{what}: face {face} has vertex {triangles[face, corner]}; there are {len(vertices)}"
         )
-    bad = ~np.isfinite(vertices).all(axis=1)
-    if bad.any():
+    if (bad := ~np.isfinite(vertices).all(axis=1)).any():
         row = int(np.argmax(bad))
         face = np.nonzero((triangles == row).any(axis=1))[0]
         where = f", used by face {face[0]}" if len(face) else ""
@@ -100,10 +95,8 @@ def clean_mesh(vertices: Array, triangles: Ints, what: str) -> tuple[Array, Ints
     cell = np.round(vertices / _WELD).astype(np.int64)
     _, first, rows = np.unique(cell, axis=0, return_index=True, return_inverse=True)
     order = np.argsort(first)  # as in the file
-    place = np.empty(len(order), dtype=np.int64)
-    place[order] = np.arange(len(order))
     vertices = vertices[first[order]]
-    welded = place[rows.reshape(-1)][triangles]
+    welded = np.argsort(order)[rows.reshape(-1)][triangles]
     corners = vertices[welded]
     longest = ((corners - np.roll(corners, 1, axis=1)) ** 2).sum(axis=2).max(axis=1)
     good = double_areas(vertices, welded) > _NO_AREA * np.maximum(longest, 1e-300)

@@ -44,17 +44,7 @@ def _turned(profile: list[tuple[float, float]]) -> tuple[Array, Ints]:
     rings = [np.stack([r * np.cos(angle), r * np.sin(angle), np.full(_ROUND, z)], axis=1)
              for r, z in profile[1:-1]]  # fmt: skip
     poles = np.array([[0.0, 0.0, profile[0][1]], [0.0, 0.0, profile[-1][1]]])
-    vertices = np.concatenate([*rings, poles])
-    here, after = np.arange(_ROUND), (np.arange(_ROUND) + 1) % _ROUND
-    south, north = len(vertices) - 2, len(vertices) - 1
-    faces = [np.stack([np.full(_ROUND, south), after, here], axis=1)]
-    for ring in range(len(rings) - 1):
-        low, high = ring * _ROUND, (ring + 1) * _ROUND
-        faces.append(np.stack([low + here, low + after, high + after], axis=1))
-        faces.append(np.stack([low + here, high + after, high + here], axis=1))
-    top = (len(rings) - 1) * _ROUND
-    faces.append(np.stack([np.full(_ROUND, north), top + here, top + after], axis=1))
-    return vertices, np.concatenate(faces)
+    return _closed(rings, poles)
 
 
 def capsule_between(start: Array, end: Array, radius: float) -> tuple[Array, Ints]:
@@ -71,16 +61,20 @@ def capsule_between(start: Array, end: Array, radius: float) -> tuple[Array, Int
         middle + radius * (high * axis + wide * circle @ np.stack(across))
         for middle, high, wide in rows
     ]
-    poles = np.stack([start - radius * axis, end + radius * axis])
-    vertices = np.concatenate([*rings, poles])
-    here = np.arange(_SEGMENTS)
-    there = (here + 1) % _SEGMENTS
-    low, high = len(vertices) - 2, len(vertices) - 1
-    triangles = [np.stack([np.full(_SEGMENTS, low), there, here], axis=1)]
+    vertices, triangles = _closed(rings, np.stack([start - radius * axis, end + radius * axis]))
+    return vertices, triangles.astype(np.int32)
+
+
+def _closed(rings: list[Array], poles: Array) -> tuple[Array, Ints]:
+    """A surface of rings of n points each, from low to high, closed by the poles (2, 3)."""
+    vertices, n = np.concatenate([*rings, poles]), len(rings[0])
+    here = np.arange(n)
+    there = (here + 1) % n
+    south, north, top = len(vertices) - 2, len(vertices) - 1, (len(rings) - 1) * n
+    faces = [np.stack([np.full(n, south), there, here], axis=1)]
     for ring in range(len(rings) - 1):
-        a, b = ring * _SEGMENTS + here, ring * _SEGMENTS + there
-        c, d = a + _SEGMENTS, b + _SEGMENTS
-        triangles += [np.stack([a, b, d], axis=1), np.stack([a, d, c], axis=1)]
-    last = (len(rings) - 1) * _SEGMENTS
-    triangles.append(np.stack([np.full(_SEGMENTS, high), last + here, last + there], axis=1))
-    return vertices, np.concatenate(triangles).astype(np.int32)
+        a, b = ring * n + here, ring * n + there
+        c, d = a + n, b + n
+        faces += [np.stack([a, b, d], axis=1), np.stack([a, d, c], axis=1)]
+    faces.append(np.stack([np.full(n, north), top + here, top + there], axis=1))
+    return vertices, np.concatenate(faces)

@@ -18,17 +18,20 @@ def compact(vertices: Array, triangles: Ints) -> tuple[Array, Ints]:
     return vertices[used], rows.reshape(-1, 3).astype(np.int32)
 
 
+def face_vectors(corners: Array) -> Array:
+    """Normal of each triangle (f, 3, 3), as long as twice its area [m^2], (f, 3)."""
+    return cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
 def double_areas(vertices: Array, triangles: Ints) -> Array:
     """Twice the area of each triangle [m^2], (f,)."""
-    a, b, c = (vertices[triangles[:, k]] for k in range(3))
-    normal = cross(b - a, c - a)
+    normal = face_vectors(vertices[triangles])
     return np.sqrt(dot(normal, normal))
 
 
 def unit_normals(vertices: Array, triangles: Ints) -> tuple[Array, Array]:
     """Unit normals (f, 3) (zero where there is no area) and areas (f,) [m^2]."""
-    a, b, c = (vertices[triangles[:, k]] for k in range(3))
-    normal = cross(b - a, c - a)
+    normal = face_vectors(vertices[triangles])
     length = np.sqrt(dot(normal, normal))
     return normal / np.maximum(length, 1e-300)[:, None], length / 2
 
@@ -40,16 +43,15 @@ def half_edges(triangles: Ints) -> Ints:
 
 def edges_of(triangles: Ints, n: int) -> tuple[Ints, Ints]:
     """Each edge once, smaller vertex first, (e, 2), and how many faces it has, (e,)."""
-    sides = np.sort(half_edges(triangles), axis=1).astype(np.int64)
-    key, count = np.unique(sides[:, 0] * n + sides[:, 1], return_counts=True)
+    keys = np.sort(half_edges(triangles), axis=1).astype(np.int64) @ np.array([n, 1])
+    key, count = np.unique(keys, return_counts=True)
     return np.stack([key // n, key % n], axis=1), count
 
 
 def rims(triangles: Ints, n: int) -> tuple[Ints, Ints]:
     """Sides that no second face shares, in their face's sense, (r, 2), and that face, (r,)."""
     sides = half_edges(triangles)
-    ordered = np.sort(sides, axis=1).astype(np.int64)
-    key = ordered[:, 0] * n + ordered[:, 1]
+    key = np.sort(sides, axis=1).astype(np.int64) @ np.array([n, 1])
     _, index, count = np.unique(key, return_index=True, return_counts=True)
     single = index[count == 1]
     return sides[single], single % len(triangles)
@@ -77,7 +79,7 @@ def point_triangle_distance(points: Array, corners: Array) -> Array:
     plane's foot, where it falls inside, and the three sides.
     """
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-    normal = cross(b - a, c - a)
+    normal = face_vectors(corners)
     square = dot(normal, normal)
     inside = square > 0
     best = np.full(len(points), np.inf)
@@ -120,8 +122,7 @@ def sample(
     points, owners = [], []
     if corners:
         used, first = np.unique(triangles, return_index=True)
-        points.append(vertices[used])
-        owners.append(first // 3)
+        points, owners = [vertices[used]], [first // 3]
     for k in range(3):
         side = p[:, (k + 1) % 3] - p[:, k]
         on, step, parts = _repeat(np.linalg.norm(side, axis=1) / spacing)

@@ -43,8 +43,7 @@ def feet(
     rate = np.hypot(*np.gradient(body, axis=0).T) + TURN_M * np.abs(np.gradient(yaw))
     passed = np.cumsum(rate)
     for row, side in enumerate(SIDES):
-        standing = _beside(body[:1], yaw[:1], side * apart)[0]
-        out[row, :, :2] = standing
+        out[row, :, :2] = _beside(body[:1], yaw[:1], side * apart)
     for walk in walks:
         inside = np.flatnonzero((time >= walk.start - EASE) & (time <= walk.end + EASE))
         if not len(inside):
@@ -53,10 +52,9 @@ def feet(
         way = passed[inside] - passed[inside[0]]
         share = way / max(way[-1], 1e-12)
         between = max(int(np.ceil(way[-1] / step)), 1)  # steps, the first and last being halves
-        moment = time[inside]
         phase = between * share
         for edge in (walk.start, walk.end):
-            phase += 0.5 * minimum_jerk((moment - edge + EASE) / (2.0 * EASE))
+            phase += 0.5 * minimum_jerk((time[inside] - edge + EASE) / (2.0 * EASE))
         for row, side in enumerate(SIDES):
             here = out[row, inside[0], :2].copy()
             spots = _beside(body[inside], yaw[inside], side * apart)

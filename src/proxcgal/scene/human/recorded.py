@@ -39,8 +39,7 @@ def read_motion(path: str | Path) -> Motion:
         with Path(path).open(newline="", encoding="utf-8-sig") as file:
             reader = csv.reader(file)
             names = [name.strip() for name in next(reader, [])]
-            missing = [name for name in HEADER if name not in names]
-            if missing:
+            if missing := [name for name in HEADER if name not in names]:
                 raise ConfigError(
                     f"motion {path}: no column {', '.join(missing[:4])}"
                     f"{' ...' if len(missing) > 4 else ''}; needed are time and x, y, z of "

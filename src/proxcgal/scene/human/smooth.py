@@ -1,9 +1,8 @@
 """Smooth motion between rests: position, speed and acceleration are continuous throughout."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -34,7 +33,7 @@ class Glide:
     cruise: float  #: [s] between
 
     @classmethod
-    def of(cls, start: float, length: float, speed: float, acceleration: float) -> Glide:
+    def of(cls, start: float, length: float, speed: float, acceleration: float) -> Self:
         """The fastest within bounds; too short a way is a minimum-jerk motion."""
         ramp = PEAK_SPEED * speed / acceleration
         if length >= ramp * speed:

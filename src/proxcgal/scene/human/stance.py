@@ -69,12 +69,11 @@ def torso(
         ],
         axis=1,
     )
-    zero = np.zeros_like(cy)
     R_WT = np.stack(
         [
             np.stack([cy * cl, -sy, cy * sl], axis=1),
             np.stack([sy * cl, cy, sy * sl], axis=1),
-            np.stack([-sl, zero, cl], axis=1),
+            np.stack([-sl, np.zeros_like(cy), cl], axis=1),
         ],
         axis=1,
     )

@@ -73,7 +73,7 @@ def joint_metrics(log: TrialLog, scenario: Scenario, robot: Robot) -> Row:
 
 def _manipulability(robot: Robot, macro: int, q: Array) -> dict[str, float]:
     """The least of each arm over the run, as a share of its largest; every tenth tick."""
-    jacobians = [macro_micro.tool_jacobian(robot, posture) for posture in q[::10]]
+    jacobians = [robot.tool_jacobian(posture) for posture in q[::10]]
     least = {}
     for arm in ("macro", "micro"):
         first, joints = macro_micro.part(robot, macro, arm)

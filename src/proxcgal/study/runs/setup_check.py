@@ -7,7 +7,7 @@ from proxcgal.models.robots import Robot
 from proxcgal.scenario.scenario import Scenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.scenario.walkthrough_scenario import WalkScenario
-from proxcgal.trial.assembly import assemble
+from proxcgal.trial.trial import assemble
 from proxcgal.trial.walkthrough.setup import WalkSetup
 
 

@@ -16,10 +16,7 @@ from proxcgal.sim.source import SimulatedSource
 from proxcgal.sim.tick import TickInput
 from proxcgal.sim.world import World
 from proxcgal.trial.walkthrough.intended_path import IntendedPath
-from proxcgal.trial.walkthrough.interactive_hand import InteractiveHand
-from proxcgal.trial.walkthrough.operator_hand import OperatorHand
-
-__all__ = ["GuidedScenario", "GuidedSource", "off_path", "off_paths"]
+from proxcgal.trial.walkthrough.operator_hand import InteractiveHand, OperatorHand
 
 
 class GuidedSource(SimulatedSource):
@@ -80,8 +77,7 @@ class GuidedSource(SimulatedSource):
 def off_path(scenario: GuidedScenario, log: TrialLog) -> Array:
     """(n,) how far the tool is from the nearest point of the path that the hand intends [m]."""
     path_W = log.tool_W[0] + IntendedPath.of(scenario.legs, 0.005).position
-    found: Array = np.array([np.linalg.norm(path_W - tool, axis=1).min() for tool in log.tool_W])
-    return found
+    return np.array([np.linalg.norm(path_W - tool, axis=1).min() for tool in log.tool_W])
 
 
 def off_paths(scenario: GuidedScenario, logs: Sequence[TrialLog]) -> dict[str, dict[str, float]]:

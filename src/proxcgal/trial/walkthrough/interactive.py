@@ -3,10 +3,9 @@
 Cycle by cycle the arm of every run: guard, hand guiding, weight and brakes.
 """
 
-from __future__ import annotations
-
 import time as clock
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from proxcgal.core.typing import Array
 from proxcgal.scenario.walkthrough_scenario import WalkScenario
 from proxcgal.sim.moment import Posed
 from proxcgal.trial.walkthrough.guarded_arm import GuardedArm
-from proxcgal.trial.walkthrough.interactive_hand import HAND, InteractiveHand
+from proxcgal.trial.walkthrough.operator_hand import HAND, InteractiveHand
 from proxcgal.trial.walkthrough.setup import PERIOD, WalkSetup
 
 CYCLES = 10  #: of the guard, in one step
@@ -38,9 +37,9 @@ class Extremes:
     speed_ratio: float  #: largest |qd| / qd_UB
     acceleration_ratio: float  #: largest |qdd| / qdd_UB
 
-    def with_cycle(self, out: _core.GuardOutput) -> Extremes:
+    def with_cycle(self, out: _core.GuardOutput) -> Self:
         """One cycle more."""
-        return Extremes(
+        return type(self)(
             distance=min(self.distance, out.distance),
             protective=max(self.protective, out.protective_distance),
             tcp_speed=max(self.tcp_speed, out.tcp_speed),
@@ -109,9 +108,9 @@ class WalkTrial:
         """Has a stop taken longer than declared? No request of a user leads out of it."""
         return bool(self._out.overrun)
 
-    def again(self) -> WalkTrial:
+    def again(self) -> Self:
         """Another one, the arm at its start, without torque."""
-        return WalkTrial(self.setup.scenario, self.setup)
+        return type(self)(self.setup.scenario, self.setup)
 
     def enable(self) -> None:
         """Presses the guard's reset; whether the torque comes back is for the safety logic."""

@@ -1,9 +1,7 @@
 """One walk-through as arrays over its cycles, and its numbers."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -56,7 +54,7 @@ class WalkLog:
     left_m: float | None = None  #: of the tool from where the intended path ends; None after a trip
 
     @classmethod
-    def empty(cls, cycles: int, joints: int, period: float, keys: GuardKeys) -> WalkLog:
+    def empty(cls, cycles: int, joints: int, period: float, keys: GuardKeys) -> Self:
         """Room for so many cycles under a guard with these keys."""
         columns: dict[str, Any] = {name: np.full(cycles, np.nan) for name in _COLUMNS}
         return cls(
@@ -98,7 +96,7 @@ class WalkLog:
             self.true_acceleration_ratio[k] = (np.abs(physics.acceleration) / bounds[1]).max()
         self.cycles += 1
 
-    def cut(self) -> WalkLog:
+    def cut(self) -> Self:
         """Itself, without the cycles that did not come."""
         for name in ("q", "qd", "tool_W", "torque", *_COLUMNS):
             setattr(self, name, getattr(self, name)[: self.cycles])
@@ -136,14 +134,16 @@ class WalkLog:
         by rounding alone does not count.
         """
         under_torque = np.r_[False, self.torque[:-1]]
-        found: Bools = under_torque & (
-            (self.true_tcp_speed > self.tcp_limit + _ROUNDING)
-            | (self.true_speed_ratio > 1.0 + _ROUNDING)
-            | (self.true_acceleration_ratio > 1.0 + _ROUNDING)
-            | (self.true_distance < self.distance_limit - _ROUNDING)
-            | (self.true_velocity > self.velocity_limit + _ROUNDING)
+        return np.asarray(
+            under_torque
+            & (
+                (self.true_tcp_speed > self.tcp_limit + _ROUNDING)
+                | (self.true_speed_ratio > 1.0 + _ROUNDING)
+                | (self.true_acceleration_ratio > 1.0 + _ROUNDING)
+                | (self.true_distance < self.distance_limit - _ROUNDING)
+                | (self.true_velocity > self.velocity_limit + _ROUNDING)
+            )
         )
-        return found
 
     def latency_cycles(self) -> int | None:
         """From the first cycle that is truly violated to the trip; None without either."""

@@ -11,7 +11,12 @@ from proxcgal.models.robots import Robot
 from proxcgal.trial.walkthrough.guarded_arm import GuardedArm
 from proxcgal.trial.walkthrough.log import WalkLog
 from proxcgal.trial.walkthrough.setup import PERIOD, WalkSetup
-from proxcgal.trial.walkthrough.taught_path import TaughtPath, needed_scale, tool_positions
+from proxcgal.trial.walkthrough.taught_path import (
+    TaughtPath,
+    needed_scale,
+    sampled,
+    tool_positions,
+)
 
 _RESET_AT, _BEGIN = 0.01, 0.10  # [s] the button, the first motion
 _SETTLE = 0.4  # [s] at the start and at the end of the path
@@ -74,9 +79,7 @@ def play(setup: WalkSetup, path: TaughtPath, q: Array | None = None) -> Playback
     log.cut()
     played = log.tool_W[start : start + run]
     inside = path_time <= path.duration
-    taught = np.stack(
-        [np.interp(path_time, path.raw_time, column) for column in path.raw_tool_W.T], axis=1
-    )
+    taught = sampled(path.raw_time, path.raw_tool_W, path_time)
     error = np.linalg.norm(played - taught, axis=1)[inside]
     return PlaybackResult(log, scale, error, scale * path.duration)
 
@@ -134,5 +137,4 @@ def _approach(setup: WalkSetup, here: Array, there: Array) -> Array:
     cycles = int(np.ceil(duration / PERIOD))
     edges = np.linspace(0.0, 1.0, cycles + 1)
     done = edges**3 * (10.0 - 15.0 * edges + 6.0 * edges**2)
-    velocities: Array = np.diff(done)[:, None] * way / PERIOD
-    return velocities
+    return np.asarray(np.diff(done)[:, None] * way / PERIOD)

@@ -4,7 +4,7 @@ import csv
 import io
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -77,16 +77,13 @@ def clean_path(robot: Robot, time: Array, q: Array, *, step: float, tolerance: f
     first, last = max(moving[0] - wait, 0), min(moving[-1] + wait + 1, len(q))
     raw_q, raw_time = q[first:last], time[first:last] - time[first]
     raw_tool = tool_positions(robot, raw_q)
+    samples = np.asarray(step * np.arange(int(np.ceil(raw_time[-1] / step)) + 1, dtype=np.float64))
 
     def made(window: float) -> TaughtPath:
-        smooth = _smoothed(raw_q, window / period)
-        count = int(np.ceil(raw_time[-1] / step)) + 1
-        samples: Array = step * np.arange(count, dtype=np.float64)
-        path = TaughtPath(samples, _sampled(raw_time, smooth, samples), raw_time, raw_tool,
-                          window, 0.0)  # fmt: skip
+        smooth = sampled(raw_time, _smoothed(raw_q, window / period), samples)
+        path = TaughtPath(samples, smooth, raw_time, raw_tool, window, 0.0)
         moved = tool_positions(robot, path.at(raw_time)[0]) - raw_tool
-        apart = float(np.linalg.norm(moved, axis=1).max())
-        return TaughtPath(samples, path.q, raw_time, raw_tool, window, apart)
+        return replace(path, deviation_m=float(np.linalg.norm(moved, axis=1).max()))
 
     best = made(0.0)
     if best.deviation_m > tolerance:
@@ -96,12 +93,11 @@ def clean_path(robot: Robot, time: Array, q: Array, *, step: float, tolerance: f
         )
     low, high = 0.0, _WIDEST
     for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        found = made(middle)
+        found = made(0.5 * (low + high))
         if found.deviation_m <= tolerance:
-            low, best = middle, found
+            low, best = found.window_s, found
         else:
-            high = middle
+            high = found.window_s
     return best
 
 
@@ -161,5 +157,6 @@ def _smoothed(q: Array, sigma: float) -> Array:
     return np.stack([np.convolve(column, window, "valid") for column in long.T], axis=1)
 
 
-def _sampled(time: Array, q: Array, samples: Array) -> Array:
-    return np.stack([np.interp(samples, time, column) for column in q.T], axis=1)
+def sampled(time: Array, values: Array, samples: Array) -> Array:
+    """(k, m) of values (n, m) known at times (n,), linearly, at other times (k,) [s]."""
+    return np.stack([np.interp(samples, time, column) for column in values.T], axis=1)
