@@ -1,7 +1,5 @@
 """`proxcgal campaign`: many trials, on this machine or on a cluster."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal, get_args

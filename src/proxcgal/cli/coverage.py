@@ -1,7 +1,5 @@
 """`proxcgal coverage`: what the sensors see of the space round the arm."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,5 @@
 """`proxcgal demo`: both static scenes with all controllers, and one report of them."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import dataclass
 from pathlib import Path

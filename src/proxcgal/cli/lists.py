@@ -1,7 +1,5 @@
 """`proxcgal scenarios` and `proxcgal robots`: what there is."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

@@ -1,7 +1,5 @@
 """The command `proxcgal`: arguments become a call, problems a line each."""
 
-from __future__ import annotations
-
 import difflib
 import os
 import shlex

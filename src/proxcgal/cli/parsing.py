@@ -1,7 +1,5 @@
 """From typed words to a command's options; a message of one line where they do not fit."""
 
-from __future__ import annotations
-
 import difflib
 import inspect
 import io

@@ -1,7 +1,5 @@
 """`proxcgal replay`: step through a recording, or recompute it with another setting."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`proxcgal report`: a folder of results becomes one self-contained HTML page."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated

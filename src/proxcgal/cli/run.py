@@ -1,7 +1,5 @@
 """`proxcgal run`: simulate a scene with one or several controllers."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`proxcgal serve`: the action server for other programs, one JSON object a line over TCP."""
 
-from __future__ import annotations
-
 import ipaddress
 from dataclasses import dataclass
 from typing import Annotated, Literal

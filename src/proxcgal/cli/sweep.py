@@ -1,7 +1,5 @@
 """`proxcgal sweep`: the timing grid of the paper, and beyond it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated

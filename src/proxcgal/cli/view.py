@@ -1,7 +1,5 @@
 """`proxcgal view`: a scene in the browser, live."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated
 

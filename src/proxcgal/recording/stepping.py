@@ -1,7 +1,5 @@
 """A recording in a terminal: a line a tick, all of one tick, and the run's numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 

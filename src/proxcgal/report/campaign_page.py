@@ -1,7 +1,5 @@
 """The HTML of a report on a campaign."""
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Iterator
 from html import escape

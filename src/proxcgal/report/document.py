@@ -1,7 +1,5 @@
 """The frame of every report: one HTML file, no network, no other file; all text escaped."""
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Iterable, Iterator
 from html import escape

@@ -1,7 +1,5 @@
 """Tables of a report as HTML; text is escaped."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from html import escape
 

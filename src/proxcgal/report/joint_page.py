@@ -1,7 +1,5 @@
 """The HTML of a report on runs of the 12-joint robot."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from html import escape
 

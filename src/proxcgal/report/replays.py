@@ -1,7 +1,5 @@
 """The 3D replays of a report: inside the page, started by a click, fetched from nowhere."""
 
-from __future__ import annotations
-
 import base64
 import json
 from collections.abc import Callable, Iterator, Sequence

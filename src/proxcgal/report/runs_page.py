@@ -1,7 +1,5 @@
 """The HTML of a report on runs of scenes: tables, figures, findings."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from html import escape
 

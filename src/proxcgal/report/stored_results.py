@@ -1,7 +1,5 @@
 """A folder of results, read back and checked: files may be old, cut, or another program's."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass, field
 from pathlib import Path

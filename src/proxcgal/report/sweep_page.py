@@ -1,7 +1,5 @@
 """The HTML of a report on the timing grid."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from html import escape
 

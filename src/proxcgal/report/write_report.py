@@ -1,7 +1,5 @@
 """A folder of results becomes one self-contained HTML page."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

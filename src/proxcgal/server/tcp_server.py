@@ -1,7 +1,5 @@
 """The action server over TCP: one JSON object a line, clients bounded in size, count and rate."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import json

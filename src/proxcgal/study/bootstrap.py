@@ -1,7 +1,5 @@
 """How sure a median is, a mean, or a ratio of sums."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """A campaign: its trials, what each is called, and what is done with it."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re

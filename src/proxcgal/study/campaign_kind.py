@@ -1,7 +1,5 @@
 """What a kind of campaign is: trials planned from a request, and findings from their table."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """A campaign's moving picture: some of its trials run again, side by side."""
 
-from __future__ import annotations
-
 import functools
 import shutil
 import tempfile

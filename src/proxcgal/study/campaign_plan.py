@@ -1,7 +1,5 @@
 """A campaign while it is planned: scenes checked and named once, trials made from them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from proxcgal.core.errors import ConfigError

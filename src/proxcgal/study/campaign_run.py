@@ -1,7 +1,5 @@
 """A campaign from its request to its folder: plan, perform, analyse, record the worst, write."""
 
-from __future__ import annotations
-
 import shlex
 import sys
 import time as clock

@@ -1,7 +1,5 @@
 """A campaign's folder: every finished trial at once, whole or not at all, and found again."""
 
-from __future__ import annotations
-
 import contextlib
 import fcntl
 import json

@@ -1,7 +1,5 @@
 """Workers of a dask.distributed scheduler: another machine's processes, or a hundred machines'."""
 
-from __future__ import annotations
-
 import logging
 import threading
 from concurrent.futures import Executor

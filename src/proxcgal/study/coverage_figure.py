@@ -1,7 +1,5 @@
 """The blind volume round an arm, in two sections, and over time."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """All trials of a campaign brought to an end: performed on workers, each stored at once."""
 
-from __future__ import annotations
-
 import functools
 import time as clock
 import traceback

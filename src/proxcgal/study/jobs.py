@@ -1,7 +1,5 @@
 """Messages between a job and its master process: the share done, and the request to stop."""
 
-from __future__ import annotations
-
 import os
 import signal
 import threading

@@ -1,7 +1,5 @@
 """The kinds of campaign that there are."""
 
-from __future__ import annotations
-
 from proxcgal.study.campaign_kind import CampaignKind
 from proxcgal.study.faults import campaign as faults
 from proxcgal.study.hri import campaign as hri

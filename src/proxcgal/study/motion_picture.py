@@ -1,7 +1,5 @@
 """A moving picture of recorded runs: side by side, under one caption each."""
 
-from __future__ import annotations
-
 import bisect
 import tempfile
 from collections.abc import Callable, Sequence

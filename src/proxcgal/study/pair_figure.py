@@ -1,7 +1,5 @@
 """Both controllers' closest pairs on the same posture, in the form of the paper's Fig. 3."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Controllers beside one another on the same draws, or with the same subjects."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """What all figures share: colours, names, axes, and the PNG file."""
 
-from __future__ import annotations
-
 import io
 import warnings
 from collections.abc import Iterable, Sequence

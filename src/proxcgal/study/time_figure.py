@@ -1,7 +1,5 @@
 """Trials over time, in the form of the paper's Figs. 7 and 8."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """One trial, in whichever process: the robot loaded once, the run measured or recorded."""
 
-from __future__ import annotations
-
 import hashlib
 import warnings
 from dataclasses import replace

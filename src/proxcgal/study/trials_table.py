@@ -1,7 +1,5 @@
 """A campaign's trials as one tidy table: a row a trial, a column a number."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Sequence
 

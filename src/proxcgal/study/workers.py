@@ -3,8 +3,6 @@
 Local workers are joblib's (loky), which come to life again when one was killed.
 """
 
-from __future__ import annotations
-
 import os
 import tempfile
 from collections import deque

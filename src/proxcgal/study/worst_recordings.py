@@ -1,7 +1,5 @@
 """Recordings of a campaign's worst trials, made by running them again: they repeat bit for bit."""
 
-from __future__ import annotations
-
 import functools
 import warnings
 from collections.abc import Mapping, Sequence

@@ -6,8 +6,6 @@ where one is set; every message is small, of a kind that the page needs, and com
 rate. `page_server` puts these checks before viser.
 """
 
-from __future__ import annotations
-
 import hmac
 import http
 import threading

@@ -1,7 +1,5 @@
 """Controls of a page: each is registered in the access control with the values that it may have."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Messages that a page may send to viser: small, of known kinds, every value checked."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass

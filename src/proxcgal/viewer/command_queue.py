@@ -1,7 +1,5 @@
 """Commands of pages, collected until they are sent: the latest value per key counts."""
 
-from __future__ import annotations
-
 import threading
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The panel of an arm that keeps its distance: controller, sensors, what stands round it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

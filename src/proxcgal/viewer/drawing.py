@@ -1,7 +1,5 @@
 """Draws a scene model and its moments with viser, for the live page, a replay and a report."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from typing import Any
 

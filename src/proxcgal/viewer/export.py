@@ -1,7 +1,5 @@
 """A run as a 3D scene that plays by itself: viser's own format, for a page without a server."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise

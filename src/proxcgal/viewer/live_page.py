@@ -1,7 +1,5 @@
 """The live page: draws the updates of the simulation, sends it the requests of pages."""
 
-from __future__ import annotations
-
 import multiprocessing
 import threading
 import time as clock

@@ -1,7 +1,5 @@
 """A scene on the live page, from the terminal that serves it."""
 
-from __future__ import annotations
-
 import os
 import sys
 import threading

@@ -1,7 +1,5 @@
 """Messages between a page and its simulation, and the queue in which they wait."""
 
-from __future__ import annotations
-
 import contextlib
 import threading
 from collections import deque

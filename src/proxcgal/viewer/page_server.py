@@ -3,8 +3,6 @@
 The checks hang in the call by which viser starts its server: there is no second port behind them.
 """
 
-from __future__ import annotations
-
 import logging
 import secrets
 import socket

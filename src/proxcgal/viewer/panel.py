@@ -1,7 +1,5 @@
 """Parts of every panel of the live page: buttons, lists, and the handle to drag with."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Curves of the last seconds: seen and true distance, activation."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """Meshes of another robot or resolution are made beside the running simulation, once."""
 
-from __future__ import annotations
-
 import contextlib
 import multiprocessing
 from multiprocessing.process import BaseProcess

@@ -1,7 +1,5 @@
 """A recording as moments to draw: what was recorded, and what other settings make of its inputs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """A recording in the browser: a time line to scrub, other settings' commands beside it."""
 
-from __future__ import annotations
-
 import sys
 import threading
 import time as clock

@@ -1,7 +1,5 @@
 """3D scenes of a report: recorded runs that play, and a scene that stands still."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

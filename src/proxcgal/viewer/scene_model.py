@@ -1,7 +1,5 @@
 """The parts of a page's scene that do not change; plain data, for another process too."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, Self
 

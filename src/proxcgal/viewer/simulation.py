@@ -5,8 +5,6 @@ that a tick never waits for a page. No request of a page leads out of a STOP: on
 runs the command restarts then.
 """
 
-from __future__ import annotations
-
 import time as clock
 import warnings
 from collections import deque

@@ -1,7 +1,5 @@
 """The panel of a walk-through: the guard's state and button, what it watches, the hand."""
 
-from __future__ import annotations
-
 import numpy as np
 import viser
 

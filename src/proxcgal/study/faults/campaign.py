@@ -1,7 +1,5 @@
 """Faults put into running trials: is the mode right, how soon, and does the arm recover?"""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

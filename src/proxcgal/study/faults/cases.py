@@ -1,7 +1,5 @@
 """The faults that a campaign puts in, row by row, and what must happen then."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """How soon every fault was answered."""
 
-from __future__ import annotations
-
 import numpy as np
 import polars as pl
 from matplotlib.figure import Figure

@@ -1,7 +1,5 @@
 """docs/reliability.md, written from a campaign's summary: every row and what showed it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

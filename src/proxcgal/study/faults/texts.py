@@ -1,7 +1,5 @@
 """What the faults' campaign amounts to, for people: table, sentences, caption, its page."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from proxcgal.core import modes

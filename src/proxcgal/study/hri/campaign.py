@@ -1,7 +1,5 @@
 """The human study: virtual subjects at two tasks beside the arm ([WA] III-B, IV-B)."""
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import Any
 

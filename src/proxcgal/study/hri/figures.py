@@ -1,7 +1,5 @@
 """Figures of the human study: Fig. 9 of the paper, courses, distributions, differences."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from typing import Any

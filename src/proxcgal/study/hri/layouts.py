@@ -1,7 +1,5 @@
 """The cell of the human study with every position moved a little, for results beyond one layout."""
 
-from __future__ import annotations
-
 import zlib
 from collections import Counter
 from collections.abc import Sequence

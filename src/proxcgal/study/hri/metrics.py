@@ -1,7 +1,5 @@
 """What the human study's trials amount to: the paper's Tables I and II, and what lies behind."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Collection
 

@@ -1,7 +1,5 @@
 """The human study's tables: the paper's Tables I and II beside ours, and what lies behind."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Any
 

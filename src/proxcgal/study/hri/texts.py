@@ -1,7 +1,5 @@
 """Texts of the human study: verdicts, introduction, captions."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from proxcgal.core.tables import counted

@@ -1,7 +1,5 @@
 """One trial beside a human as numbers, and its course at the sensors' rate."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The 12-joint robot: every scene from every start, with each task on and off, known and sensed."""
 
-from __future__ import annotations
-
 import polars as pl
 
 from proxcgal.core.errors import ConfigError

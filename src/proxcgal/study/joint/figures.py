@@ -1,7 +1,5 @@
 """Runs of the 12-joint robot over time: macro against micro motion, activations, distance."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from typing import Any

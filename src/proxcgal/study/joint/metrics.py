@@ -1,7 +1,5 @@
 """One run of the 12-joint robot as numbers, and as curves at ten points a second."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Texts of the runs of the 12-joint robot: tables, verdicts, captions."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from statistics import median
 from typing import Any

@@ -1,7 +1,5 @@
 """A run looked at for its coverage: what of the space round the arm its sensors saw, and when."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

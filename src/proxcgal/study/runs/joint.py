@@ -1,7 +1,5 @@
 """Runs of a scene for the 12-joint robot: from each initial configuration of its file."""
 
-from __future__ import annotations
-
 import functools
 import sys
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """What a run is shown as: jobs that draw a folder's figures and its moving picture."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Folders of results: made, shown to be writable, cleared of an earlier run's files."""
 
-from __future__ import annotations
-
 import contextlib
 import tempfile
 from collections.abc import Sequence

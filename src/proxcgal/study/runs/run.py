@@ -1,7 +1,5 @@
 """A run of one scenario, whatever its kind."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Runs of scenes with one arm: each controller once, numbers and pictures in a folder a scene."""
 
-from __future__ import annotations
-
 import functools
 import sys
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """A scenario set up once before a run, so that nothing is written where something does not fit."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from proxcgal.core.progress import announce

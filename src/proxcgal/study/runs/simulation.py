@@ -1,7 +1,5 @@
 """Recorded trials side by side, with their progress."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Sequence
 

@@ -1,7 +1,5 @@
 """Run of a walk-through: teach, record, play back, draw, and say what was found."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Static scenes with random draws: what whole-body avoidance gains, and what sensing costs it."""
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Random scenes round a given one: panel, start posture and goal, drawn from a seed."""
 
-from __future__ import annotations
-
 import zlib
 from collections import Counter
 from collections.abc import Sequence

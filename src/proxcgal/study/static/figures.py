@@ -1,7 +1,5 @@
 """Distributions over drawn scenes."""
 
-from __future__ import annotations
-
 import polars as pl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure

@@ -1,7 +1,5 @@
 """How much of what sensing costs a memory gives back, over the draws of one scene."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 

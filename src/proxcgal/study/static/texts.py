@@ -1,7 +1,5 @@
 """Texts of the drawn static scenes: tables, verdicts, captions."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from proxcgal.core.tables import in_metres

@@ -1,7 +1,5 @@
 """The robot at several resolutions in what it senses, in the form of the paper's Fig. 6."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

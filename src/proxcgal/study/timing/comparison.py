@@ -1,7 +1,5 @@
 """The timing grid read across: literal against accelerated, and both against the sensors' cycle."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

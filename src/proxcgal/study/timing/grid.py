@@ -1,7 +1,5 @@
 """The timing grid of [WA] III-C and IV-C: both algorithms by both methods, cell by cell."""
 
-from __future__ import annotations
-
 import gc
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence

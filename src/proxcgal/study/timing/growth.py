@@ -1,7 +1,5 @@
 """How a time grows: exponents fitted on log axes, with their intervals."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass

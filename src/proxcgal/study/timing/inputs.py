@@ -1,7 +1,5 @@
 """What the cells of the timing grid work on: robot, posture and cloud, as [WA] III-C has them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The whole timing grid: inputs prepared, every cell measured, numbers and pictures written."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

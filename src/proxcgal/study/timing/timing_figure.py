@@ -1,7 +1,5 @@
 """The timing grid as curves, in the form of the paper's Fig. 10."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import zip_longest
 from typing import Any

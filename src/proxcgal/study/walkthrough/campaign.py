@@ -1,7 +1,5 @@
 """Random operators guide the painting arm: does the guard trip at once, and on nothing else?"""
 
-from __future__ import annotations
-
 import numpy as np
 import polars as pl
 

@@ -1,7 +1,5 @@
 """Random operators and paths: some keep within the guard's bounds, others break one of them."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass

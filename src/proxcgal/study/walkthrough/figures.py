@@ -1,7 +1,5 @@
 """Walk-throughs over time, in the form of [WT] Figs. 6 to 8, and ratings in that of Fig. 9."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

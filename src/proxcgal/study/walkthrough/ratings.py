@@ -1,7 +1,5 @@
 """Ratings that testers gave, from a user's own table; none is made up."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Distribution of stops over random operators."""
 
-from __future__ import annotations
-
 import polars as pl
 from matplotlib.figure import Figure
 

@@ -1,7 +1,5 @@
 """Texts of the walk-throughs' campaign: table, verdicts, caption."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 
