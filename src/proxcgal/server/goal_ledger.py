@@ -1,7 +1,5 @@
 """Goals of whatever arm, one at a time: numbered, cancelled, and each ended exactly once."""
 
-from __future__ import annotations
-
 from collections import OrderedDict
 from dataclasses import dataclass
 from typing import Generic, TypeVar

@@ -1,7 +1,5 @@
 """Pictures of the simulated world, drawn off screen by MuJoCo."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass
