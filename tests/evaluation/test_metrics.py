@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 import proxcgal as px
+from proxcgal.core import files
 from proxcgal.evaluation import metrics
 from proxcgal.evaluation.coverage import Coverage
 from proxcgal.study.plotting import CONTROLLER_COLOURS, png
@@ -109,7 +110,7 @@ def test_a_gain_over_nothing_is_no_gain(both: list[Any]) -> None:
 
 def test_what_does_not_apply_is_null_and_the_json_is_strict(tmp_path: Path) -> None:
     summary = metrics.static_summary([make_log(own_m=float("nan"))])
-    metrics.write_json(tmp_path / "summary.json", summary)
+    files.write_json(tmp_path / "summary.json", summary)
     text = (tmp_path / "summary.json").read_text()
     assert json.loads(text)["self_min_m"] is None
     assert "NaN" not in text
@@ -118,15 +119,15 @@ def test_what_does_not_apply_is_null_and_the_json_is_strict(tmp_path: Path) -> N
 
 def test_numbers_survive_the_file_exactly(tmp_path: Path, both: list[Any]) -> None:
     summary = metrics.static_summary(both)
-    metrics.write_json(tmp_path / "summary.json", summary)
+    files.write_json(tmp_path / "summary.json", summary)
     assert json.loads((tmp_path / "summary.json").read_text()) == summary
 
 
 def test_a_number_that_json_cannot_hold_leaves_the_old_file_whole(tmp_path: Path) -> None:
     path = tmp_path / "summary.json"
-    metrics.write_json(path, {"a": 1})
+    files.write_json(path, {"a": 1})
     with pytest.raises(ValueError, match="JSON"):
-        metrics.write_json(path, {"a": float("nan")})
+        files.write_json(path, {"a": float("nan")})
     assert json.loads(path.read_text()) == {"a": 1}
     assert [p.name for p in tmp_path.iterdir()] == ["summary.json"]
 
@@ -249,6 +250,6 @@ def test_a_full_disk_is_told_with_the_file_that_had_no_room(
 
     monkeypatch.setattr("os.fsync", full)
     with pytest.raises(OSError, match="No space left") as caught:
-        metrics.write_json(tmp_path / "summary.json", {})
+        files.write_json(tmp_path / "summary.json", {})
     assert caught.value.filename == str(tmp_path / "summary.json")
     assert list(tmp_path.iterdir()) == []
