@@ -271,9 +271,9 @@ class World:
                 cure = "install libegl1 and libgl1-mesa-dri, or libosmesa6"
                 if _TOO_LATE:
                     cure = "mujoco was imported before proxcgal.sim: import that first"
-                backend = os.environ.get("MUJOCO_GL")
                 raise SimulationError(
-                    f"cannot draw off screen with MUJOCO_GL={backend}: {error}; {cure}"
+                    f"cannot draw off screen with MUJOCO_GL={os.environ.get('MUJOCO_GL')}: "
+                    f"{error}; {cure}"
                 ) from None
         return self._renderers[size]
 
