@@ -15,8 +15,8 @@ import proxcgal as px
 from proxcgal.core.provenance import versions
 from proxcgal.core.transforms import rotation_from_rpy
 from proxcgal.recording import codec, foxglove
-from proxcgal.recording.reader import Recording, Settings, read_recording
-from proxcgal.recording.writer import Recorder
+from proxcgal.recording.reader import Recording, read_recording
+from proxcgal.recording.writer import Recorder, Settings
 from proxcgal.scenario.loading import load_scenario
 from proxcgal.sim.clouds import Clouds
 from proxcgal.sim.tick import Found, TaskResult, Tick, TickInput, TickResult, TickTruth

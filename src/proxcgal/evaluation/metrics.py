@@ -111,8 +111,8 @@ def table(summaries: Sequence[Summary]) -> str:
             cells = [in_metres(numbers[key]) for key in CONTROLLER_KEYS[:4]]
             if violated:
                 cells.append("-" if numbers["violations"] is None else str(numbers["violations"]))
-            last = "" if gain is None else f"{gain:+.0f}"
-            rows.append([summary["scenario"], name, *cells, last])
+            cells.append("" if gain is None else f"{gain:+.0f}")
+            rows.append([summary["scenario"], name, *cells])
     return aligned(rows, left=2, heads=2)
 
 

@@ -133,11 +133,11 @@ class _Pairs:
                 break
             bound = best + AHEAD_M
             other, T_AB = self._surfaces.trees[self.links[row]], self._T_AB[row][tick]
-            found = solid_distance(self._trees[row], self._rounding[row], other, T_AB, bound)[0]
-            distance = min(found, bound)
+            found = solid_distance(self._trees[row], self._rounding[row], other, T_AB, bound)
+            distance = min(found[0], bound)
             sweep, known = self._sweeps[row], self._at_least[row, ticks]
-            nearer = distance - most_moved(sweep[tick : tick + 1], sweep[ticks])
-            np.maximum(known, nearer, out=known)
+            moved = most_moved(sweep[tick : tick + 1], sweep[ticks])
+            np.maximum(known, distance - moved, out=known)
             if distance < best:
                 best, nearest = distance, int(row)
         self.distance[tick], self.nearest[tick] = best, nearest

@@ -1,6 +1,6 @@
 """When a run is over: the goal reached, or no progress towards it for too long."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -49,22 +49,22 @@ class Ending:
     holding: StallCause | None = None
 
 
+@dataclass(slots=True, eq=False)
 class GoalWatch:
     """Is the goal reached, or has nothing come nearer to it for a while?"""
 
-    def __init__(self, finish: FinishKeys, goal: Array) -> None:
-        """Args: `goal` is T_WT (4, 4)."""
-        self._finish = finish
-        self._goal = goal
-        self._least = [np.inf, np.inf]  # [m], [rad] that counted as progress last
-        self._since = 0.0
+    finish: FinishKeys
+    goal: Array  #: (4, 4) T_WT
+    #: [m], [rad] that counted as progress last, and since when [s].
+    _least: list[float] = field(default_factory=lambda: [np.inf, np.inf], init=False)
+    _since: float = field(default=0.0, init=False)
 
     def __call__(self, time: float, T_WT: Array) -> Ending | None:
         """How the run ends here, or None: it goes on.
 
         Progress is a least error so far, in position or in angle, that fell by a set amount.
         """
-        errors, finish = pose_errors(T_WT, self._goal), self._finish
+        errors, finish = pose_errors(T_WT, self.goal), self.finish
         if errors[0] <= finish.position and errors[1] <= finish.angle:
             return Ending("succeeded", "the goal is reached")
         for row, error in enumerate(errors):

@@ -172,8 +172,7 @@ def _least(distances: Array) -> float:
 
 
 def _points(points: Sequence[Sequence[float] | None]) -> Array:
-    nothing = (np.nan,) * 3
-    return np.array([p or nothing for p in points], np.float64).reshape(-1, 3)
+    return np.array([p or (np.nan,) * 3 for p in points], np.float64).reshape(-1, 3)
 
 
 def _tool(robot: Robot, q: Array) -> Array:

@@ -40,8 +40,9 @@ def _panda() -> RobotDescription:
 
 def _kr150() -> RobotDescription:
     path = _data("rtbdata", "xacro/kuka_description/kuka_kr150/urdf/kr150_2.xacro", "rtb-data")
-    packages = {"kuka_kr150_support": path.parents[1]}
-    found = read_description(path, base="base_link", packages=packages)
+    found = read_description(
+        path, base="base_link", packages={"kuka_kr150_support": path.parents[1]}
+    )
     return _renamed(found, "kr150", "tool0", "tool0")
 
 

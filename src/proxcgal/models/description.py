@@ -8,15 +8,13 @@ from typing import Literal
 from proxcgal.core.errors import ModelError
 from proxcgal.core.typing import Array, Ints
 
-JointType = Literal["revolute", "prismatic"]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Joint:
     """One moving joint; fixed joints are folded into `origin`."""
 
     name: str
-    type: JointType
+    type: Literal["revolute", "prismatic"]
     parent: int  # row of the joint it hangs on, -1 for the base
     origin: Array  # (4, 4) joint frame at q = 0 in the parent joint's frame
     axis: Array  # (3,) unit, in the joint frame
@@ -97,8 +95,10 @@ class RobotDescription:
         for frame in self.frames:
             if frame.name == name:
                 return frame
-        names = listed(frame.name for frame in self.frames)
-        raise ModelError(f"robot '{self.name}' has no frame '{name}'; it has {names}")
+        raise ModelError(
+            f"robot '{self.name}' has no frame '{name}'; it has "
+            f"{listed(frame.name for frame in self.frames)}"
+        )
 
     def link_row(self, name: str) -> int:
         """Row of a link.

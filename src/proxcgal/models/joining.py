@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from proxcgal.core.errors import ModelError
 from proxcgal.core.typing import Array
-from proxcgal.models.description import Frame, Joint, Link, RobotDescription, listed
+from proxcgal.models.description import RobotDescription, listed
 
 
 def joined(
@@ -74,10 +74,10 @@ def rigid(pose: ArrayLike, what: str) -> Array:
         T = np.asarray(pose, dtype=np.float64)
     except (TypeError, ValueError):
         raise ModelError(f"{what} = {str(pose)[:80]}; a finite (4, 4) pose is needed") from None
-    if T.shape == (4, 4) and not np.isfinite(T).all():
-        raise ModelError(f"{what} holds NaN or infinity; a finite (4, 4) pose is needed")
     if T.shape != (4, 4):
         raise ModelError(f"{what} has shape {T.shape}; a finite (4, 4) pose is needed")
+    if not np.isfinite(T).all():
+        raise ModelError(f"{what} holds NaN or infinity; a finite (4, 4) pose is needed")
     R = T[:3, :3]
     turns = np.abs(R @ R.T - np.eye(3)).max() < 1e-6 and np.linalg.det(R) > 0
     if not turns or (T[3] != [0, 0, 0, 1]).any():
@@ -111,14 +111,16 @@ def hung_on(
     def placed(own: int, pose: Array) -> Array:
         return T_JB @ pose if own < 0 else pose
 
-    joints: list[Joint] = [
-        replace(j, parent=row(j.parent), origin=placed(j.parent, j.origin))
-        for j in description.joints
-    ]
-    links: list[Link] = [
-        replace(k, joint=row(k.joint), T_JL=placed(k.joint, k.T_JL)) for k in description.links
-    ]
-    frames: list[Frame] = [
-        replace(f, joint=row(f.joint), T_JF=placed(f.joint, f.T_JF)) for f in description.frames
-    ]
-    return replace(description, joints=tuple(joints), links=tuple(links), frames=tuple(frames))
+    return replace(
+        description,
+        joints=tuple(
+            replace(j, parent=row(j.parent), origin=placed(j.parent, j.origin))
+            for j in description.joints
+        ),
+        links=tuple(
+            replace(k, joint=row(k.joint), T_JL=placed(k.joint, k.T_JL)) for k in description.links
+        ),
+        frames=tuple(
+            replace(f, joint=row(f.joint), T_JF=placed(f.joint, f.T_JF)) for f in description.frames
+        ),
+    )

@@ -63,8 +63,7 @@ def _never_near(robot: Robot, pairs: list[tuple[int, int]], d_min: float) -> set
 
 def manipulability(J: Array, first: int, joints: int) -> float:
     """sqrt(det(J J')) of an arm's columns of the tool's Jacobian."""
-    own = J[:, first : first + joints]
-    return float(np.prod(np.linalg.svd(own, compute_uv=False)))
+    return float(np.prod(np.linalg.svd(J[:, first : first + joints], compute_uv=False)))
 
 
 @once_per_robot

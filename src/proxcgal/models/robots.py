@@ -30,8 +30,8 @@ from proxcgal.models.mesh.resolution import (
     control_mesh,
 )
 
-P = ParamSpec("P")
-T = TypeVar("T")
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
 
 
 class Robot(_core.Robot):
@@ -115,13 +115,13 @@ class Robot(_core.Robot):
 
 
 def once_per_robot(
-    make: Callable[Concatenate[Robot, P], T],
-) -> Callable[Concatenate[Robot, P], T]:
+    make: Callable[Concatenate[Robot, _P], _T],
+) -> Callable[Concatenate[Robot, _P], _T]:
     """Keeps what a function makes of a robot and other arguments, as long as the robot lives."""
-    known: WeakKeyDictionary[Robot, dict[Any, T]] = WeakKeyDictionary()
+    known: WeakKeyDictionary[Robot, dict[Any, _T]] = WeakKeyDictionary()
 
     @functools.wraps(make)
-    def kept(robot: Robot, /, *args: P.args, **named: P.kwargs) -> T:
+    def kept(robot: Robot, /, *args: _P.args, **named: _P.kwargs) -> _T:
         made, key = known.setdefault(robot, {}), (args, tuple(named.items()))
         if key not in made:
             made[key] = make(robot, *args, **named)

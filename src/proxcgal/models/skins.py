@@ -158,8 +158,7 @@ def _outer_radius(
 ) -> Array:
     """Distance (n,) from the centre to the outermost surface in each direction [m]."""
     reach = float(np.linalg.norm(vertices - centre, axis=1).max()) + 0.1
-    hit = tree.first_hit(centre + reach * outward, -outward)
-    radius = np.asarray(reach - hit)
+    radius = np.asarray(reach - tree.first_hit(centre + reach * outward, -outward))
     if (missed := ~(radius > 0)).any():
         angle = np.degrees(np.arctan2(*outward[missed][0][::-1][:2]))
         raise GeometryError(

@@ -84,10 +84,9 @@ class Surfaces:
         probes_B = np.empty((0, 3))
         for pose in poses:
             T_AB = inverse(pose[a]) @ pose[b]
-            if len(probes_B):
-                probes_A = placed(T_AB, probes_B)
-                if self.trees[a].closest(probes_A)[0].min() < ALWAYS_NEAR:
-                    continue
+            probes_A = placed(T_AB, probes_B)
+            if len(probes_A) and self.trees[a].closest(probes_A)[0].min() < ALWAYS_NEAR:
+                continue
             distance, _, near_B = self.trees[a].distance(self.trees[b], T_AB, ALWAYS_NEAR)
             if distance >= ALWAYS_NEAR:
                 return False

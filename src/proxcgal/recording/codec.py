@@ -143,9 +143,11 @@ def pack_scans(scans: Sequence[_core.Scan]) -> bytes:
     parts = []
     for row, (scan, whole) in enumerate(zip(scans, exact.all(axis=1).tolist(), strict=True)):
         form = _MILLIMETRES if whole else _METRES
-        parts.append(_SCAN.pack(scan.sensor, scan.counter, scan.stamp, form))
-        parts.append(scan.status.tobytes())
-        parts.append((steps[row] if whole else ranges[row].astype("<f8")).tobytes())
+        parts += [
+            _SCAN.pack(scan.sensor, scan.counter, scan.stamp, form),
+            scan.status.tobytes(),
+            (steps[row] if whole else ranges[row].astype("<f8")).tobytes(),
+        ]
     return b"".join(parts)
 
 

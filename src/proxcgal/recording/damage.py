@@ -106,8 +106,7 @@ class Contents:
         offset = len(MCAP0_MAGIC)
         while offset < len(self._data):
             head = self._data[offset : offset + _HEAD]
-            length = int.from_bytes(head[1:], "little")
-            end = offset + _HEAD + length
+            end = offset + _HEAD + int.from_bytes(head[1:], "little")
             if len(head) < _HEAD or end > len(self._data):
                 raise _DamageError(f"{self._place(offset)}: cut off at byte {len(self._data)}")
             yield offset, head[0], self._data[offset + _HEAD : end]

@@ -48,8 +48,7 @@ class McapFile(Closing):
 
     def unwritable(self, error: OSError) -> ConfigError:
         """What to raise where the file cannot be begun."""
-        reason = error.strerror or error
-        return ConfigError(f"recording {self.path}: cannot be written: {reason}")
+        return ConfigError(f"recording {self.path}: cannot be written: {error.strerror or error}")
 
     def begin(
         self, library: str, schemas: Mapping[str, Mapping[str, Any]], settings: Mapping[str, str]

@@ -11,11 +11,9 @@ from proxcgal.core.errors import RecordingError
 from proxcgal.core.typing import Array
 from proxcgal.recording.damage import Contents
 from proxcgal.recording.foxglove import points_of
-from proxcgal.recording.writer import Recorder, Settings
+from proxcgal.recording.writer import Settings
 from proxcgal.sim.clouds import Clouds
 from proxcgal.sim.tick import Tick
-
-__all__ = ["Recorder", "Recording", "Settings", "read_recording"]
 
 _LONGEST_STEP = 1.0  # [s] from tick to tick; beyond, the clock has jumped
 _SAME_STEP = 1e-6  # [s] a simulator's ticks are as even as that

@@ -68,8 +68,9 @@ class Replay:
                 f"recording {recording.path}: was made on known points and holds no scans, which "
                 f"controller {self.controller!r} needs; wb_known does not"
             )
-        room = 0 if self._known is None else len(self._known)
-        self.ctrl = self.setup.make_controller(self.controller, room)
+        self.ctrl = self.setup.make_controller(
+            self.controller, 0 if self._known is None else len(self._known)
+        )
 
     def __iter__(self) -> Iterator[Tick]:
         """Ticks with the new answers; `ctrl` then holds the state after the yielded one."""

@@ -129,5 +129,4 @@ class Recorder(McapFile):
 
 def settings_crc(content: Mapping[str, str]) -> str:
     """Checksum of the settings, which stand before any tick."""
-    text = json.dumps({key: content[key] for key in sorted(content)})
-    return str(zlib.crc32(text.encode()))
+    return str(zlib.crc32(json.dumps(dict(content), sort_keys=True).encode()))

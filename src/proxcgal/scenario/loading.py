@@ -86,8 +86,7 @@ def _checked(table: dict[str, Any], origin: str, overrides: Sequence[str]) -> Sc
 
 
 def _built_in() -> list[Path]:
-    folder = Path(str(resources.files("proxcgal.scenario"))) / "builtin"
-    return sorted(folder.glob("*.toml"))
+    return sorted(Path(str(resources.files("proxcgal.scenario"))).glob("builtin/*.toml"))
 
 
 def _anchor(table: dict[str, Any], folder: Path) -> None:

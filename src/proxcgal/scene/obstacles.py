@@ -80,13 +80,11 @@ class Together:
 
     def poses(self, time: float) -> Array:
         """(n, 4, 4) T_WO."""
-        parts = [scene.poses(time) for scene in self._scenes]
-        return np.concatenate([np.empty((0, 4, 4)), *parts])
+        return np.concatenate([np.empty((0, 4, 4)), *(each.poses(time) for each in self._scenes)])
 
     def twists(self, time: float) -> Array:
         """(n, 6) in world: velocity of each origin [m/s], angular velocity [rad/s]."""
-        parts = [scene.twists(time) for scene in self._scenes]
-        return np.concatenate([np.empty((0, 6)), *parts])
+        return np.concatenate([np.empty((0, 6)), *(each.twists(time) for each in self._scenes)])
 
 
 class KnownCloud:

@@ -82,8 +82,9 @@ class JointArm:
     def set_tasks(self, tasks: Sequence[str], off: Sequence[str]) -> None:
         """Another stack; the commands go on. Raises: ConfigError, an unknown name."""
         changes = [f"controller.{k}={list(v)!r}" for k, v in (("tasks", tasks), ("off", off))]
-        changed = change_scenario(self.setup.scenario, "tasks", changes)
-        self.setup = replace(self.setup, scenario=changed)
+        self.setup = replace(
+            self.setup, scenario=change_scenario(self.setup.scenario, "tasks", changes)
+        )
         qd = self.qd
         self._start(self.q)
         self._actuation.qd = qd

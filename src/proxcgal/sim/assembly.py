@@ -59,10 +59,9 @@ class Assembly:
         ctrl = setup.make_controller(controller, 0 if known is None else len(known))
         faults = FaultInjector(scenario.faults, [mount.name for mount in setup.skin.mounts], seed)
         world = World(setup.robot, setup.scene) if known is None else None
-        source = make_source(setup, world, seed)
         return cls(
             setup=setup, controller=controller, seed=seed, known=known, ctrl=ctrl, faults=faults,
-            world=world, source=source,
+            world=world, source=make_source(setup, world, seed),
         )  # fmt: skip
 
     def ticks(
@@ -76,8 +75,7 @@ class Assembly:
         setup, source = self.setup, self.source
         if self.world is None:
             source = SimulatedSource(setup, World(setup.robot, setup.scene), self.seed)
-        scans = source.standing(MOUNT_CHECK_SCANS)
-        return check_mounts(setup.robot, setup.skin, setup.q0, scans)
+        return check_mounts(setup.robot, setup.skin, setup.q0, source.standing(MOUNT_CHECK_SCANS))
 
     def require_mounts(self) -> MountChecks | None:
         """The same, where the scenario asks for it and there are sensors; None otherwise.

@@ -32,8 +32,7 @@ class RangeModel:
         self._sensors = sensors
         self._seed = seed
         self._index, self._drawn = -1, (np.empty(0),) * 3  # draws of the scan made last
-        self._sub_rays = simulation.sub_rays
-        rays = _directions(sensor.field_of_view, self._sub_rays)
+        rays = _directions(sensor.field_of_view, simulation.sub_rays)
         length = np.linalg.norm(rays, axis=1)
         #: (64 * sub_rays, 3) unit directions in the sensor's frame, zone by zone.
         self.rays_S: Array = rays / length[:, None]
@@ -79,7 +78,7 @@ class RangeModel:
         return self._zones(lengths * self._z_per_length)
 
     def _zones(self, of_rays: NDArray[Any]) -> NDArray[Any]:
-        return of_rays.reshape(len(of_rays), ZONES, self._sub_rays)
+        return of_rays.reshape(len(of_rays), ZONES, self._simulation.sub_rays)
 
     def _draws(self, index: int) -> tuple[Array, Array, Array]:
         if index != self._index:  # scans come in order: one index at a time is enough

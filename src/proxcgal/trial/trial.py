@@ -159,8 +159,8 @@ def _with_coverage(log: TrialLog, setup: Setup, q: Array) -> TrialLog:
     found = replace(log, coverage=coverage_of(setup, q, log.elapsed))
     if not setup.measured.solids:
         return found
-    moments = (found.nearest_tick, len(log.elapsed) - 1)
-    at_nearest, at_end = sightings(setup, q, log.elapsed, moments)
+    ticks = (found.nearest_tick, len(log.elapsed) - 1)
+    at_nearest, at_end = sightings(setup, q, log.elapsed, ticks)
     return replace(found, sightings=(at_nearest, at_end))
 
 

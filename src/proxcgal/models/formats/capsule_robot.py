@@ -138,8 +138,7 @@ class CapsuleRobot(_Table):
                 Link(name=link.name, joint=joint, T_JL=T_JL, vertices_L=vertices,
                      triangles=triangles)
             )  # fmt: skip
-        row = [link.name for link in self.links].index(self.tool.link)
-        joint, T_JL = self.placed[row]
+        joint, T_JL = self.placed[[link.name for link in self.links].index(self.tool.link)]
         tool = Frame(
             name=self.tool.name, joint=joint,
             T_JF=T_JL @ pose(self.tool.position, self.tool.rpy),

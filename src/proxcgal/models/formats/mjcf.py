@@ -48,8 +48,7 @@ def check_structure(root: ET.Element, path: Path, folders: MeshFolders) -> list[
             "(equality); joints that follow others are not read: take a model without that part "
             "and put it on with attach_mesh"
         )
-    world = root.findall("worldbody")
-    top = [body for element in world for body in element.findall("body")]
+    top = root.findall("worldbody/body")
     if len(top) != 1:
         raise ModelError(
             f"{path}: bodies {listed(b.get('name', '?') for b in top)} stand side by side in the "
@@ -169,8 +168,7 @@ def shapes(model: Any, path: Path, root: ET.Element) -> dict[str, list[Shape]]:
 
 
 def _shape(geom: Any, model: Any, link: str, path: Path) -> Shape | None:
-    inner = model.frames[geom.parentFrame].placement.inverse()
-    pose = (inner * geom.placement).homogeneous
+    pose = (model.frames[geom.parentFrame].placement.inverse() * geom.placement).homogeneous
     shape, kind = geom.geometry, type(geom.geometry).__name__
     if kind in ("Halfspace", "Plane"):
         return None  # the floor: no part of the robot

@@ -49,9 +49,8 @@ def build_link_mesh(
         else:
             assert part.mesh is not None
             points, faces = part.mesh
-        with np.errstate(
-            over="ignore", invalid="ignore"
-        ):  # `clean_mesh` refuses what is not finite
+        # `clean_mesh` refuses what is not finite.
+        with np.errstate(over="ignore", invalid="ignore"):
             if part.scale is not None:
                 points = points * part.scale
                 if np.prod(np.sign(part.scale)) < 0:  # mirrored: turn the faces back
@@ -92,8 +91,7 @@ def describe(
     import pinocchio as pin  # here, because a warm cache does without it
 
     data = model.createData()
-    neutral = pin.neutral(model)
-    pin.computeJointJacobians(model, data, neutral)
+    pin.computeJointJacobians(model, data, pin.neutral(model))
     pin.updateFramePlacements(model, data)
     if model.njoints < 2:
         raise ModelError(f"{source}: no moving joint")

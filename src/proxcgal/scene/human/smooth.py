@@ -20,8 +20,7 @@ def minimum_jerk(share: Array) -> Array:
 
 def least_duration(length: float, speed: float, acceleration: float) -> float:
     """Of a minimum-jerk motion that keeps both bounds [s]."""
-    by_speed = PEAK_SPEED * length / speed
-    return max(by_speed, math.sqrt(PEAK_ACCELERATION * length / acceleration))
+    return max(PEAK_SPEED * length / speed, math.sqrt(PEAK_ACCELERATION * length / acceleration))
 
 
 @dataclass(frozen=True, slots=True)

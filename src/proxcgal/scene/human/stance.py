@@ -127,8 +127,8 @@ def stance_for(
     distance = float(np.linalg.norm(way))
     ahead = way / max(distance, 1e-9)
     steps = np.linspace(min(-0.3, distance - 0.8), max(distance - _APART, -0.3), 121)
-    leans = np.linspace(0.0, _LEAN, 43)
-    step, lean = (grid.ravel() for grid in np.meshgrid(steps, leans, indexing="ij"))
+    grids = np.meshgrid(steps, np.linspace(0.0, _LEAN, 43), indexing="ij")
+    step, lean = (grid.ravel() for grid in grids)
     feet = start + step[:, None] * ahead
     yaw = float(np.arctan2(way[1], way[0]) - side * subject.turn)
     pelvis, R_WT = torso(subject, floor, feet, np.full(len(step), yaw), lean, np.zeros(len(step)))

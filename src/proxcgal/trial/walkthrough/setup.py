@@ -67,10 +67,9 @@ class WalkSetup:
 
     def make_guide(self) -> _core.HandGuide:
         """Hand guiding, its commands a share of what the guard lets pass. Raises: ConfigError."""
-        keys = self.scenario.admittance
         return _core.HandGuide(
             self.robot,
-            admittance=_core.AdmittanceConfig(**keys.model_dump()),
+            admittance=_core.AdmittanceConfig(**self.scenario.admittance.model_dump()),
             qdd_max=self.scenario.arm.command_share * self.bounds.qdd_bounds,
             period=PERIOD,
         )

@@ -74,8 +74,7 @@ def worst_case_problem(setup: WalkSetup) -> str | None:
 
 def _worst(setup: WalkSetup, scale: float) -> StoppingPerformance:
     robot, q = setup.robot, np.array(STRETCHED)
-    lever = np.linalg.norm(robot.tool_jacobian(q)[:3, _SINKING])
-    speed = WORST_SPEED / lever
+    speed = WORST_SPEED / np.linalg.norm(robot.tool_jacobian(q)[:3, _SINKING])
     q[_SINKING] -= 0.5 * speed * _RAMP  # so that it is level once that fast
     brakes = scale * setup.scenario.arm.brake_scale
     physics = Physics(
