@@ -4,7 +4,6 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from documented import rows_of
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -13,6 +12,7 @@ from proxcgal.core import toml
 from proxcgal.core.errors import ConfigError
 from proxcgal.scenario.joint_scenario import JointScenario
 from proxcgal.scenario.loading import KINDS, list_scenarios, load_scenario, parse_scenario
+from proxcgal.scenario.reference import rows_of, updated
 from proxcgal.scenario.scenario import Scenario
 from proxcgal.scenario.setup import Setup
 
@@ -289,6 +289,12 @@ def test_every_key_is_documented_with_its_default() -> None:
     joint = (DOCS.parent / "joint_robot.md").read_text()
     own = [row for row in rows_of(JointScenario) if "`configurations`" not in row]
     assert [row for row in own if row not in text + joint] == []
+
+
+@pytest.mark.parametrize("page", ["scenarios.md", "walkthrough.md", "joint_robot.md"])
+def test_the_tables_of_keys_say_what_the_schema_says(page: str) -> None:
+    text = (DOCS.parent / page).read_text()
+    assert updated(text) == text  # python -m proxcgal.scenario.reference docs/*.md
 
 
 def test_the_scenario_in_the_documentation_can_be_copied(tmp_path: Path) -> None:

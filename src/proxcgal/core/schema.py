@@ -1,12 +1,21 @@
 """Tables of a file that users write: strict types, bounds, and defaults of the C++ core."""
 
 import math
-from typing import Annotated, Any
+from collections.abc import Collection
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    GetPydanticSchema,
+    create_model,
+)
+from pydantic_core import core_schema
 
-from proxcgal import _core
+from proxcgal._core import FieldRecord, field_tables
 
 
 def _not_nan(value: float) -> float:
@@ -24,25 +33,81 @@ Vector = Annotated[tuple[float, ...], Field(min_length=3, max_length=3)]
 Bound = Annotated[float, Field(allow_inf_nan=True), AfterValidator(_not_nan)]
 
 
-def like(
-    struct: str,
-    attribute: str,
-    description: str,
-    *,
-    ge: float | None = None,
-    le: float | None = None,
-    lt: int | None = None,
-) -> Any:
-    """A field whose default is that of the core's struct; bounds as pydantic names them."""
-
-    def default() -> Any:
-        value = getattr(getattr(_core, struct)(), attribute)
-        return tuple(np.asarray(value).tolist()) if isinstance(value, list | np.ndarray) else value
-
-    return Field(default_factory=default, description=description, ge=ge, le=le, lt=lt)
-
-
 class Section(BaseModel):
     """A table of the file: unknown keys are errors, values are not converted, nothing changes."""
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+def core_table(struct: str, *, only: Collection[str] = (), omit: Collection[str] = ()) -> Any:
+    """Base of a table whose keys are the settings of a config struct of the core.
+
+    Args:
+        struct: its name in `_core.field_tables()`: keys, types, bounds, defaults, descriptions.
+        only: these settings; empty for all.
+        omit: settings that a file does not have.
+    """
+    return _table(struct, field_tables()[struct], only, omit)
+
+
+def core_key(struct: str, setting: str) -> Any:
+    """A key under a name of the file's own: bound, default and description of a core's setting."""
+    record = _record(struct, setting)
+    return _field(record, **(_bounds(record) if record.type in ("int", "float") else {}))
+
+
+def core_choice(struct: str, setting: str) -> GetPydanticSchema:
+    """For the annotation of a `core_key` that is one of several names."""
+    names = _record(struct, setting).choices
+    return GetPydanticSchema(lambda _type, _handler: core_schema.literal_schema(list(names)))
+
+
+def _record(struct: str, setting: str) -> FieldRecord:
+    return next(each for each in field_tables()[struct] if each.name == setting)
+
+
+def _table(
+    struct: str, records: list[FieldRecord], only: Collection[str], omit: Collection[str]
+) -> type[Section]:
+    keys: dict[str, Any] = {
+        record.name: (_annotation(record), _field(record))
+        for record in records
+        if record.name not in omit and (not only or record.name in only)
+    }
+    return create_model(struct, __base__=Section, **keys)
+
+
+def _field(record: FieldRecord, **bounds: Any) -> Any:
+    unit = f"[{record.unit}] " if record.unit else ""
+    default: Any = ... if record.required else record.default
+    if isinstance(default, list | np.ndarray):
+        default = tuple(np.asarray(default).tolist())
+    return Field(default, description=unit + record.sentence, **bounds)
+
+
+def _annotation(record: FieldRecord) -> Any:
+    """Its type with its bounds."""
+    match record.type:
+        case "enum":
+            return Literal[tuple(record.choices)]
+        case "strings":
+            return tuple[str, ...]
+        case "bool":
+            return bool
+        case "int":
+            return Annotated[int, Field(**_bounds(record))]
+        case "vector":
+            number = Annotated[float, Field(**_bounds(record))]
+            size = record.size or None
+            return Annotated[tuple[number, ...], Field(min_length=size or 1, max_length=size)]
+    # A file states finite numbers, but where infinity switches a bound off.
+    standard: Any = record.default
+    return Bound if math.isinf(standard) else Annotated[float, Field(**_bounds(record))]
+
+
+def _bounds(record: FieldRecord) -> dict[str, Any]:
+    """As pydantic names them; whole numbers for an int."""
+    number = int if record.type == "int" else float
+    least, most = "gt" if record.least_exclusive else "ge", "lt" if record.most_exclusive else "le"
+    ends = ((least, record.least), (most, record.most))
+    return {name: number(value) for name, value in ends if math.isfinite(value)}

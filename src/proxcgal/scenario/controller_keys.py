@@ -1,10 +1,10 @@
 """The keys of a scenario's `[controller]`: tasks, filter, solver, monitor."""
 
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from proxcgal.core.schema import Bound, Count, NonNegative, Positive, Section, Share, like
+from proxcgal.core.schema import Section, core_choice, core_key, core_table
 
 SensedController = Literal["wb", "sm", "wb_memory"]
 TaskName = Literal[
@@ -29,108 +29,20 @@ STACKS: dict[str, tuple[TaskName, ...]] = {
 }
 
 
-class FilterKeys(Section):
+class FilterKeys(core_table("FilterConfig")):
     """Body removal."""
 
-    tolerance: NonNegative = like("FilterConfig", "tolerance", "[m] epsilon of Algorithm 1")
-    sigmas: NonNegative = like(
-        "FilterConfig", "sigmas", "the tolerance is at least this many sigma(range)"
-    )
-    min_hit: NonNegative = like(
-        "FilterConfig", "min_hit", "[m] nearer hits are the sensor's own mounting"
-    )
-    surface_margin: bool = like(
-        "FilterConfig", "surface_margin", "also drop what lies that near to any link"
-    )
-    confirmation: Literal["off", "zones", "scans"] = like(
-        "FilterConfig", "confirmation", "believe a point only when seen twice"
-    )
-    z_min: Bound = like("FilterConfig", "z_min", "[m] points below are cropped (floor)")
 
-
-class SolverKeys(Section):
+class SolverKeys(core_table("SolverConfig")):
     """The task-priority solver."""
 
-    damping: NonNegative = like("SolverConfig", "damping", "lambda")
-    damping_threshold: Positive = like(
-        "SolverConfig",
-        "damping_threshold",
-        "s_th; eigenvalues of X'AX below are damped: singular values below its square root",
-    )
-    eta: NonNegative = like("SolverConfig", "eta", "cost of leaving the upper levels' freedom")
-    form: Literal["literal", "code"] = like("SolverConfig", "form", "of the damped inverse")
 
-
-class MonitorKeys(Section):
+class MonitorKeys(core_table("MonitorConfig", omit=("await_mounts",))):
     """Bounds of the monitor."""
 
-    degraded_after: Positive = like(
-        "MonitorConfig", "degraded_after", "[s] age of one sensor's scan that slows the arm"
-    )
-    hold_after: Positive = like(
-        "MonitorConfig", "hold_after", "[s] age of an array's scans that holds the arm"
-    )
-    degraded_scale: Share = like(
-        "MonitorConfig", "degraded_scale", "of the speed limits while degraded"
-    )
-    clean_cycles: Count = like(
-        "MonitorConfig", "clean_cycles", "cycles without a cause before a mode clears"
-    )
-    missed_deadlines: Count = like(
-        "MonitorConfig", "missed_deadlines", "in a row, before the arm holds"
-    )
-    suspect_repeats: int = like(
-        "MonitorConfig",
-        "suspect_repeats",
-        "equal payloads in a row that make a sensor suspect; 0 for never (sensors without noise)",
-        ge=0,
-    )
-    fresh_within: Positive = like(
-        "MonitorConfig", "fresh_within", "[s] a scan of this age is trusted as it is"
-    )
-    approach_speed: NonNegative = like(
-        "MonitorConfig",
-        "approach_speed",
-        "[m/s] assumed of what moves in: past `fresh_within` it shortens the trusted distance",
-    )
-    blind_speed: NonNegative = like(
-        "MonitorConfig",
-        "blind_speed",
-        "[m/s] at most into what a silent sensor covered; 0 at `hold_after`",
-    )
-    joints_hold_after: Positive = like(
-        "MonitorConfig", "joints_hold_after", "[s] age of the joint state that holds the arm"
-    )
-    joints_stop_after: Positive = like(
-        "MonitorConfig", "joints_stop_after", "[s] age of the joint state that stops it"
-    )
-    stuck_after: Positive = like(
-        "MonitorConfig", "stuck_after", "[s] of avoidance not executed inside d_min, before HOLD"
-    )
 
-
-class MemoryKeys(Section):
+class MemoryKeys(core_table("MemoryConfig")):
     """What `wb_memory` remembers."""
-
-    memory_s: NonNegative = like(
-        "MemoryConfig", "memory_s", "[s] age at which a point is forgotten in any case; 0: none"
-    )
-    voxel: Positive = like(
-        "MemoryConfig", "voxel", "[m] edge; each holds one point, the newest", ge=0.005, le=0.5
-    )
-    max_points: int = like(
-        "MemoryConfig",
-        "max_points",
-        "beyond, the farthest from the arm are forgotten",
-        ge=3,
-        le=65536,
-    )
-    clear_scans: Count = like(
-        "MemoryConfig",
-        "clear_scans",
-        "that must see through a point before it counts as gone",
-        le=100,
-    )
 
 
 class MotionKeys(Section):
@@ -139,45 +51,22 @@ class MotionKeys(Section):
     controllers: tuple[SensedController, ...] = Field(
         ("wb_memory",), description="of wb, sm, wb_memory: those that use it"
     )
-    window: Positive = like("MotionConfig", "window", "[s] scans that old count", le=1)
-    radius: Positive = like(
-        "MotionConfig", "radius", "[m] of the patch of surface round the closest point", le=1
-    )
-    confidence: NonNegative = like(
-        "MotionConfig", "confidence", "standard deviations below which a velocity counts as none"
-    )
-    max_speed: NonNegative = like(
-        "MotionConfig", "max_speed", "[m/s] the estimate is shortened to it"
-    )
+    window: float = core_key("MotionConfig", "window")
+    radius: float = core_key("MotionConfig", "radius")
+    confidence: float = core_key("MotionConfig", "confidence")
+    max_speed: float = core_key("MotionConfig", "max_speed")
 
 
-class JointLimitsKeys(Section):
+class JointLimitsKeys(core_table("JointLimits")):
     """Task `joint_limits`."""
 
-    gain: Positive = like("JointLimits", "gain", "[1/s] towards the middle")
-    margin: Positive = like("JointLimits", "margin", "[rad] or [m] where it begins to act")
 
-
-class MinimumAltitudeKeys(Section):
+class MinimumAltitudeKeys(core_table("MinimumAltitude")):
     """Task `minimum_altitude`."""
 
-    height: float = like("MinimumAltitude", "height", "[m] the tool is to stay above")
-    buffer: Positive = like("MinimumAltitude", "buffer", "[m] above it, where it begins to act")
-    gain: Positive = like("MinimumAltitude", "gain", "[1/s]")
 
-
-class ManipulabilityKeys(Section):
+class ManipulabilityKeys(core_table("Manipulability")):
     """Task `manipulability`."""
-
-    target: Positive = like("Manipulability", "target", "the rate pulls towards it")
-    low: Positive = like("Manipulability", "low", "fully active below")
-    high: Positive = like("Manipulability", "high", "inactive above")
-    gain: Positive = like("Manipulability", "gain", "[1/s]")
-    first_joint: int = like(
-        "Manipulability", "first_joint", "of the arm that is meant, from 0", ge=0
-    )
-    joints: int = like("Manipulability", "joints", "of that arm; 0: all from the first on", ge=0)
-    unit: Positive = like("Manipulability", "unit", "it is counted in this: 1, or the maximum")
 
     @model_validator(mode="after")
     def _low_below_high(self) -> Self:
@@ -186,38 +75,28 @@ class ManipulabilityKeys(Section):
         return self
 
 
-class ArmManipulabilityKeys(Section):
+class ArmManipulabilityKeys(core_table("Manipulability", only=("target", "low", "high", "gain"))):
     """Tasks `manipulability_macro` and `manipulability_micro`: one arm of two, normalised.
 
     The arm's manipulability counts as a share of the largest that 4000 random postures of the
     whole robot have.
     """
 
-    target: Positive = like("Manipulability", "target", "the rate pulls towards it")
-    low: Positive = like("Manipulability", "low", "fully active below")
-    high: Positive = like("Manipulability", "high", "inactive above")
-    gain: Positive = like("Manipulability", "gain", "[1/s]")
 
-
-class SelfCollisionKeys(Section):
+class SelfCollisionKeys(core_table("SelfCollision", omit=("pairs",))):
     """Task `self_collision`: links that joints beyond the first arm move, against all others."""
-
-    d_min: NonNegative = like("SelfCollision", "d_min", "[m] distance to keep")
-    buffer: Positive = like("SelfCollision", "buffer", "[m] above it, where it begins to act")
-    gain: Positive = like("SelfCollision", "gain", "[1/s]")
-    nearest: Count = like("SelfCollision", "nearest", "this many nearest pairs of links", le=32)
 
 
 class ControllerKeys(Section):
     """The control law, the same for the whole body and for the sensor points."""
 
-    d_min: Positive = like("Avoidance", "d_min", "[m] distance to keep")
-    buffer: Positive = like("Avoidance", "buffer", "[m] Delta: avoidance fades in over it")
-    avoid_gain: Positive = like("Avoidance", "gain", "[1/s] lambda of avoidance")
-    nearest: Count = like("Avoidance", "nearest", "this many nearest links, one row each", le=32)
-    reach_gain: Positive = like("Reach", "gain", "[1/s] lambda of reaching")
-    max_linear: Positive = like("Reach", "max_linear", "[m/s] of reaching")
-    max_angular: Positive = like("Reach", "max_angular", "[rad/s] of reaching")
+    d_min: float = core_key("Avoidance", "d_min")
+    buffer: float = core_key("Avoidance", "buffer")
+    avoid_gain: float = core_key("Avoidance", "gain")
+    nearest: int = core_key("Avoidance", "nearest")
+    reach_gain: float = core_key("Reach", "gain")
+    max_linear: float = core_key("Reach", "max_linear")
+    max_angular: float = core_key("Reach", "max_angular")
     tasks: tuple[TaskName, ...] = Field(
         ("avoidance", "reach"), min_length=1, description="their order is their priority"
     )
@@ -227,17 +106,10 @@ class ControllerKeys(Section):
         ge=0,
         description="so many first joints are those of an arm that carries another; 0: none",
     )
-    min_row_norm: NonNegative = like(
-        "ControllerConfig",
-        "min_row_norm",
-        "a link that joints move less than this is passed over",
-        lt=1,
-    )
-    avoid_links: tuple[str, ...] = like(
-        "ControllerConfig", "avoid_links", "links to keep away; empty: all that some joint moves"
-    )
-    method: Literal["fast", "paper"] = like(
-        "ControllerConfig", "method", "accelerated or literal, with the same answer"
+    min_row_norm: float = core_key("ControllerConfig", "min_row_norm")
+    avoid_links: tuple[str, ...] = core_key("ControllerConfig", "avoid_links")
+    method: Annotated[str, core_choice("ControllerConfig", "method")] = core_key(
+        "ControllerConfig", "method"
     )
     filter: FilterKeys = Field(default_factory=FilterKeys)
     solver: SolverKeys = Field(default_factory=SolverKeys)

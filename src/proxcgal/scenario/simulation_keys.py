@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from proxcgal.core.schema import NonNegative, Positive, Section, Share, like
+from proxcgal.core.schema import NonNegative, Positive, Section, Share, core_key
 
 
 class SimulationKeys(Section):
@@ -21,10 +21,8 @@ class SimulationKeys(Section):
     sub_rays: Literal[1, 4, 9, 16] = Field(
         1, description="rays cast in each zone, of which the nearest counts"
     )
-    sigma_floor: NonNegative = like("SensorModel", "sigma_floor", "[m] least noise of a range")
-    sigma_ratio: NonNegative = like(
-        "SensorModel", "sigma_ratio", "noise as a share of the range, where that is more"
-    )
+    sigma_floor: float = core_key("SensorModel", "sigma_floor")
+    sigma_ratio: float = core_key("SensorModel", "sigma_ratio")
     bias: float = Field(0.0, description="[m] added to every range")
     dropout: Share = Field(0.02, description="share of zones that lose their target in a scan")
     uncertain: Share = Field(0.0, description="share of targets that come with status 6 or 9")

@@ -1,11 +1,10 @@
 """The keys of a scenario's `[skin]`: rings of sensors, and their model."""
 
-import math
-from typing import Annotated, Literal
+from typing import Literal
 
 from pydantic import Field
 
-from proxcgal.core.schema import Count, NonNegative, Positive, Section, Share, like
+from proxcgal.core.schema import Count, NonNegative, Section, Share, core_table
 
 
 class RingKeys(Section):
@@ -25,26 +24,8 @@ class RingKeys(Section):
     )
 
 
-class SensorKeys(Section):
+class SensorKeys(core_table("SensorModel")):
     """What the controller takes a sensor for (VL53L8CX)."""
-
-    field_of_view: Annotated[float, Field(gt=0, lt=math.pi)] = like(
-        "SensorModel", "field_of_view", "[rad] along one side of the 8 x 8 zones"
-    )
-    min_range: NonNegative = like("SensorModel", "min_range", "[m] along the sensor's z axis")
-    max_range: Positive = like("SensorModel", "max_range", "[m] along the sensor's z axis")
-    workspace: Positive = like(
-        "SensorModel", "workspace", "[m] along the ray; farther points are cropped"
-    )
-    sigma_floor: NonNegative = like(
-        "SensorModel", "sigma_floor", "[m] least standard deviation the filter reckons with"
-    )
-    sigma_ratio: NonNegative = like(
-        "SensorModel", "sigma_ratio", "of the range, where that is more than the floor"
-    )
-    range_model: Literal["tangent", "printed"] = like(
-        "SensorModel", "range_model", "form of [WA] eq. (1)"
-    )
 
 
 class SkinKeys(Section):

@@ -4,61 +4,39 @@ from typing import Annotated
 
 from pydantic import Field
 
-from proxcgal.core.schema import NonNegative, Positive, Section, Share, Vector, like
-
-Vector6 = Annotated[tuple[float, ...], Field(min_length=6, max_length=6)]
+from proxcgal.core.schema import NonNegative, Positive, Section, Share, Vector, core_key, core_table
 
 
-class HumanKeys(Section):
+class HumanKeys(core_table("OperatorCapsule")):
     """The operator's capsule, which rides on the tool and stands upright."""
 
-    radius: Positive = Field(0.200, description="[m] opRad")
-    height: Positive = Field(1.80, description="[m] opH, rounding included")
-    offset: Vector = Field(
-        (0.0, 0.0, 0.25), description="[m] opRelP, of its middle in the tool's frame"
-    )
 
-
-class IsoKeys(Section):
+class IsoKeys(core_table("IsoSeparation")):
     """What the separation distance of ISO/TS 15066 is computed with, beside the threshold."""
-
-    human_speed: NonNegative = Field(1.6, description="[m/s] v_h")
-    reaction_time: NonNegative = Field(1.0 / 15.0, description="[s] T_r, one frame of a sensor")
-    intrusion: NonNegative = Field(0.0, description="[m] C")
-    human_uncertainty: NonNegative = Field(0.0, description="[m] Z_d")
-    robot_uncertainty: NonNegative = Field(0.0, description="[m] Z_r")
 
 
 class GuardKeys(Section):
     """The guard: [WT] section 3."""
 
-    tcp_speed: Positive = Field(1.30, description="[m/s] xd_UB")
-    stop_time: Positive = Field(0.35, description="[s] stopT, declared")
-    rest_speed: Positive = Field(0.01, description="[rad/s] of every joint, at rest")
-    max_gap: Positive = Field(0.0025, description="[s] a longer cycle cuts the torque")
-    min_distance: NonNegative = Field(0.455, description="[m] minDistTh")
-    max_velocity: Positive = Field(1.30, description="[m/s] maxVelTh")
-    q_reference: tuple[float, ...] = Field(min_length=1, description="[rad] posture of eq. (1)")
-    pairs: tuple[str, ...] = Field((), description="links whose distance counts; none: all")
-    ends: tuple[str, ...] = Field(
-        (), description="links whose far end's velocity counts; none: all"
+    tcp_speed: float = core_key("GuardConfig", "tcp_speed")
+    stop_time: float = core_key("GuardConfig", "stop_time")
+    rest_speed: float = core_key("GuardConfig", "rest_speed")
+    max_gap: float = core_key("GuardConfig", "max_gap")
+    min_distance: float = core_key("GuardConfig", "min_distance")
+    max_velocity: float = core_key("GuardConfig", "max_velocity")
+    q_reference: Annotated[tuple[float, ...], Field(min_length=1)] = core_key(
+        "GuardConfig", "q_reference"
     )
-    subtract_human: bool = Field(False, description="velocity relative to the tool's operator")
-    accept: tuple[str, ...] = Field((), description="contradictions to take as they are, by item")
+    pairs: tuple[str, ...] = core_key("GuardConfig", "pairs")
+    ends: tuple[str, ...] = core_key("GuardConfig", "ends")
+    subtract_human: bool = core_key("GuardConfig", "subtract_human")
+    accept: tuple[str, ...] = core_key("GuardConfig", "accept")
     human: HumanKeys = Field(default_factory=HumanKeys)
     iso: IsoKeys = Field(default_factory=IsoKeys)
 
 
-class AdmittanceKeys(Section):
+class AdmittanceKeys(core_table("AdmittanceConfig")):
     """M a + D v = F: three linear and three angular axes, in the base frame."""
-
-    mass: Vector6 = like("AdmittanceConfig", "mass", "[kg], [kg m^2] M")
-    damping: Vector6 = like("AdmittanceConfig", "damping", "[N s/m], [N m s/rad] D")
-    dead_band: Vector6 = like("AdmittanceConfig", "dead_band", "[N], [N m]")
-    max_force: Vector6 = like("AdmittanceConfig", "max_force", "[N], [N m]")
-    engage_time: NonNegative = like(
-        "AdmittanceConfig", "engage_time", "[s] in which the hand is let in, and let go"
-    )
 
 
 class HandKeys(Section):
