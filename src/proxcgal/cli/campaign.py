@@ -94,7 +94,7 @@ class CampaignOptions:
 def campaign_command(options: CampaignOptions, command: str) -> int:
     """Runs what is unfinished; prints tables, what was kept, what failed, the report's path."""
     from proxcgal.report.write_report import write_report
-    from proxcgal.study.campaign_kind import CampaignRequest
+    from proxcgal.study.campaign import CampaignRequest
     from proxcgal.study.campaign_run import CampaignEffort, print_campaign, run_campaign
     from proxcgal.study.kinds import KINDS
 

@@ -5,11 +5,10 @@ from collections.abc import Iterator
 from html import escape
 from pathlib import Path
 
-from proxcgal.report.document import Pictures, document, origin_part
-from proxcgal.report.html_table import listing_part
+from proxcgal.report.document import Pictures, document, listing_part, origin_part
 from proxcgal.report.replays import Replays
 from proxcgal.report.stored_results import StoredResults
-from proxcgal.study.campaign_kind import CampaignKind
+from proxcgal.study.campaign import CampaignKind
 from proxcgal.study.worst_recordings import FOLDER
 
 

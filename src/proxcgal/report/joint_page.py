@@ -3,8 +3,7 @@
 from collections.abc import Iterator
 from html import escape
 
-from proxcgal.report.document import Pictures, document, origin_part, recordings_part
-from proxcgal.report.html_table import listing_part
+from proxcgal.report.document import Pictures, document, listing_part, origin_part, recordings_part
 from proxcgal.report.stored_results import StoredResults
 from proxcgal.study.joint.texts import listings, verdicts
 from proxcgal.study.runs.joint import FIGURE

@@ -7,8 +7,7 @@ from html import escape
 from pathlib import Path
 
 from proxcgal.core.errors import ProxError
-from proxcgal.viewer.export import viser_client
-from proxcgal.viewer.report_scene import replay_scene, still_scene
+from proxcgal.viewer.report_scene import replay_scene, still_scene, viser_client
 
 REPLAY_BYTES = 6_000_000  # of the page, at most, for the scenes and their player
 ORDER = ("wb", "wb_memory", "sm", "wb_known")  # the first that is there is drawn whole

@@ -5,8 +5,15 @@ from html import escape
 
 from proxcgal.core.tables import in_metres
 from proxcgal.evaluation.metrics import COVERAGE_KEYS, SELF_LIMIT_M
-from proxcgal.report.document import Pictures, document, origin_part, recordings_part
-from proxcgal.report.html_table import cell, head, table_part
+from proxcgal.report.document import (
+    Pictures,
+    cell,
+    document,
+    head,
+    origin_part,
+    recordings_part,
+    table_part,
+)
 from proxcgal.report.replays import Replays
 from proxcgal.report.stored_results import About, StoredNumbers, StoredRun
 from proxcgal.study.runs.pictures import SIDE_BY_SIDE

@@ -14,15 +14,13 @@ from proxcgal.core.progress import ProgressBar, announce
 from proxcgal.core.provenance import origin, versions
 from proxcgal.evaluation.metrics import Summary
 from proxcgal.recording.writer import RecordedTicks
-from proxcgal.study.campaign import Campaign, Ended, Trial
-from proxcgal.study.campaign_kind import CampaignKind, CampaignRequest
-from proxcgal.study.campaign_picture import draw_moving
+from proxcgal.study.campaign import Campaign, CampaignKind, CampaignRequest, Ended, Trial
 from proxcgal.study.campaign_store import CampaignStore, Outcome
-from proxcgal.study.execution import perform_trials, unfinished
+from proxcgal.study.execution import parquet_bytes, perform_trials, trials_table, unfinished
+from proxcgal.study.motion_picture import draw_moving
 from proxcgal.study.plotting import png
-from proxcgal.study.runs.setup_check import check_setup
+from proxcgal.study.runs.preparation import check_setup
 from proxcgal.study.trial_simulation import robot_of
-from proxcgal.study.trials_table import parquet_bytes, trials_table
 from proxcgal.study.workers import Pool, default_workers
 from proxcgal.study.worst_recordings import record_worst
 

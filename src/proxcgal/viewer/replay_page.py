@@ -14,9 +14,9 @@ from proxcgal.core import modes
 from proxcgal.recording.reader import Recording
 from proxcgal.sim.moment import Moment, metres
 from proxcgal.viewer.access import AccessControl
-from proxcgal.viewer.allowed_controls import AllowedControls
 from proxcgal.viewer.drawing import Drawing, add_surroundings
 from proxcgal.viewer.page_server import checked_token, page_address, served_page
+from proxcgal.viewer.panel import AllowedControls
 from proxcgal.viewer.plots import plot_whole_run
 from proxcgal.viewer.replay_moments import AHEAD, ReplayedRun, replay_moments
 

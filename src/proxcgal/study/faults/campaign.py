@@ -16,9 +16,7 @@ from proxcgal.scenario.loading import load_scenario
 from proxcgal.scenario.scenario import Scenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.sim.assembly import Assembly
-from proxcgal.study.campaign import Campaign, Trial
-from proxcgal.study.campaign_kind import CampaignKind, CampaignRequest
-from proxcgal.study.campaign_plan import CampaignPlan
+from proxcgal.study.campaign import Campaign, CampaignKind, CampaignPlan, CampaignRequest, Trial
 from proxcgal.study.campaign_store import Row as Numbers
 from proxcgal.study.faults.cases import ROW_OF, ROWS, TICK_MS, Fault, Row
 from proxcgal.study.faults.figures import figures

@@ -12,9 +12,14 @@ from proxcgal.evaluation.phases import SAMPLES_HZ
 from proxcgal.scenario.hri_scenario import HriScenario
 from proxcgal.scenario.loading import load_scenario
 from proxcgal.scenario.scenario import CONTROLLERS
-from proxcgal.study.campaign import Campaign, Trial, file_name
-from proxcgal.study.campaign_kind import CampaignKind, CampaignRequest
-from proxcgal.study.campaign_plan import CampaignPlan
+from proxcgal.study.campaign import (
+    Campaign,
+    CampaignKind,
+    CampaignPlan,
+    CampaignRequest,
+    Trial,
+    file_name,
+)
 from proxcgal.study.campaign_store import Row
 from proxcgal.study.hri.figures import figures
 from proxcgal.study.hri.layouts import draw_layout

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from proxcgal.evaluation.metrics import Summary
-from proxcgal.study.bootstrap import mean_interval
+from proxcgal.study.bootstrap import mean_interval, pairs
 from proxcgal.study.hri.metrics import (
     SAMPLE_S,
     compared,
@@ -18,7 +18,6 @@ from proxcgal.study.hri.metrics import (
     series,
     subject_means,
 )
-from proxcgal.study.paired import pairs
 from proxcgal.study.plotting import (
     CONTROLLER_COLOURS,
     CONTROLLER_NAMES,

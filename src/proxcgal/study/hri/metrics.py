@@ -9,9 +9,8 @@ import polars as pl
 from proxcgal.core.typing import Array
 from proxcgal.evaluation.metrics import SELF_LIMIT_M, Summary
 from proxcgal.evaluation.phases import SAMPLES_HZ
-from proxcgal.study.bootstrap import mean_interval
+from proxcgal.study.bootstrap import Distances, by_controller, mean_interval, pairs
 from proxcgal.study.campaign import Campaign
-from proxcgal.study.paired import Distances, by_controller, pairs
 
 #: [WA] Tables I and II: mean and sigma_max [m] by row and controller.
 PAPER_MEANS = {

@@ -8,9 +8,7 @@ from proxcgal.evaluation.metrics import SELF_LIMIT_M, Summary
 from proxcgal.models.macro_micro import part
 from proxcgal.scenario.joint_scenario import JointScenario
 from proxcgal.scenario.loading import load_scenario
-from proxcgal.study.campaign import Campaign, Trial
-from proxcgal.study.campaign_kind import CampaignKind, CampaignRequest
-from proxcgal.study.campaign_plan import CampaignPlan
+from proxcgal.study.campaign import Campaign, CampaignKind, CampaignPlan, CampaignRequest, Trial
 from proxcgal.study.campaign_store import Row
 from proxcgal.study.joint.figures import figures
 from proxcgal.study.joint.metrics import COLUMNS, joint_metrics

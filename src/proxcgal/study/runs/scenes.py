@@ -27,10 +27,8 @@ from proxcgal.scenario.scenario import Scenario
 from proxcgal.scenario.walkthrough_scenario import GuidedScenario
 from proxcgal.study.jobs import Job
 from proxcgal.study.runs.pictures import draw_figures, draw_motion
-from proxcgal.study.runs.result_folders import ready_folders, remove_empty
-from proxcgal.study.runs.setup_check import check_setup
-from proxcgal.study.runs.simulation import simulate_all
-from proxcgal.study.trial_simulation import simulate_trial
+from proxcgal.study.runs.preparation import check_setup, ready_folders, remove_empty
+from proxcgal.study.trial_simulation import simulate_all, simulate_trial
 from proxcgal.study.workers import Pool, default_workers
 from proxcgal.trial.walkthrough.guided_source import off_paths
 

@@ -9,7 +9,7 @@ from proxcgal.core.provenance import origin
 from proxcgal.core.tables import aligned
 from proxcgal.scenario.walkthrough_scenario import WalkScenario
 from proxcgal.study.plotting import png
-from proxcgal.study.runs.result_folders import ready_folders, remove_empty
+from proxcgal.study.runs.preparation import ready_folders, remove_empty
 from proxcgal.study.walkthrough.figures import ratings_figure, teach_figure, trip_figure
 from proxcgal.study.walkthrough.ratings import read_ratings
 from proxcgal.trial.walkthrough.run import WalkResult, run_walk

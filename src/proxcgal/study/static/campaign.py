@@ -13,12 +13,9 @@ from proxcgal.core.progress import OnProgress
 from proxcgal.evaluation.metrics import CONTROLLER_KEYS, COVERAGE_KEYS, SELF_LIMIT_M, Summary
 from proxcgal.scenario.loading import load_scenario
 from proxcgal.scenario.scenario import CONTROLLERS, Scenario
-from proxcgal.study.bootstrap import median_interval
-from proxcgal.study.campaign import Campaign, Trial
-from proxcgal.study.campaign_kind import CampaignKind, CampaignRequest
-from proxcgal.study.campaign_plan import CampaignPlan
+from proxcgal.study.bootstrap import draw_distances, median_interval, pairs
+from proxcgal.study.campaign import Campaign, CampaignKind, CampaignPlan, CampaignRequest, Trial
 from proxcgal.study.campaign_store import Row
-from proxcgal.study.paired import draw_distances, pairs
 from proxcgal.study.static.draws import draw_scene
 from proxcgal.study.static.figures import figures
 from proxcgal.study.static.memory_share import memory_summary

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from proxcgal.core.tables import in_metres
 from proxcgal.evaluation.metrics import SELF_LIMIT_M, Summary
 from proxcgal.study.bootstrap import ENOUGH
-from proxcgal.study.listing import Listing
+from proxcgal.study.campaign import Listing
 from proxcgal.study.static.figures import memory_file, scene_file
 from proxcgal.study.static.memory_share import memory_rows, memory_sentences
 
