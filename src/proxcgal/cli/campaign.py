@@ -126,10 +126,11 @@ def _recorded(options: CampaignOptions) -> int:
     form, _, kept = options.keep.partition(":")
     if options.keep != "none" and not (form == "worst" and kept.isdecimal()):
         problems.append(f"--keep {options.keep}: must be worst:N, such as worst:5, or none")
-    for name in ("runs", "subjects"):
-        count = getattr(options, name)
-        if count is not None and count < 1:
-            problems.append(f"--{name} {count}: must be 1 or more")
+    problems += [
+        f"--{name} {count}: must be 1 or more"
+        for name, count in (("runs", options.runs), ("subjects", options.subjects))
+        if count is not None and count < 1
+    ]
     if options.kind != "hri":
         own = {
             "subjects": options.subjects, "controller": options.controller,

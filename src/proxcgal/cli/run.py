@@ -126,11 +126,11 @@ def overrides(options: RunOptions) -> list[str]:
     changes = []
     if options.robot is not None:
         path = Path(options.robot).expanduser()
-        is_file = is_robot_file(path)
-        changes.append("robot=" + json.dumps(str(path.absolute()) if is_file else options.robot))
-    inputs = flat(options.package_dir, "--package-dir")
-    folders = [str(path.expanduser().absolute()) for path in inputs]
-    if folders:
+        robot = str(path.absolute()) if is_robot_file(path) else options.robot
+        changes.append(f"robot={json.dumps(robot)}")
+    if folders := [
+        str(path.expanduser().absolute()) for path in flat(options.package_dir, "--package-dir")
+    ]:
         changes.append("package_dirs=" + json.dumps(folders))
     if options.subject is not None:
         changes.append(f"operator.subject={options.subject}")

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from html import escape
 from pathlib import Path
 
-from proxcgal.report.document import Pictures, document, listing_part, origin_part
+from proxcgal.report.document import Pictures, document, findings_parts, origin_part
 from proxcgal.report.replays import Replays
 from proxcgal.report.stored_results import StoredResults
 from proxcgal.study.campaign import CampaignKind
@@ -21,10 +21,7 @@ def _parts(kind: CampaignKind, stored: StoredResults) -> Iterator[str]:
     summary = stored.summary
     text = kind.introduction
     yield f"<p>{escape(text if isinstance(text, str) else text(summary))}</p>"
-    for sentence in kind.verdicts(summary):
-        yield f"<p>{escape(sentence)}</p>"
-    for listing in kind.listings(summary):
-        yield from listing_part(listing)
+    yield from findings_parts(kind.verdicts(summary), kind.listings(summary))
     replays = Replays()
     worst = _replay_of_worst(stored, replays)
     pictures = Pictures(replays.used)

@@ -57,8 +57,10 @@ class Pictures:
         kind = "gif" if path.suffix == ".gif" else "png"
         data = base64.b64encode(path.read_bytes()).decode()
         alt = escape(caption.split(". ")[0], quote=True)
-        image = f'<img src="data:image/{kind};base64,{data}" alt="{alt}">'
-        return f"<figure>{image}<figcaption>{escape(caption)}</figcaption></figure>"
+        return (
+            f'<figure><img src="data:image/{kind};base64,{data}" alt="{alt}">'
+            f"<figcaption>{escape(caption)}</figcaption></figure>"
+        )
 
 
 def table_part(
@@ -93,8 +95,15 @@ def cell(text: object, style: str = "", *, rows: int | None = None, bold: bool =
     return f"<td{_class(style)}{span}>{f'<b>{inner}</b>' if bold else inner}</td>"
 
 
-def listing_part(listing: Listing) -> Iterator[str]:
-    """A table of results."""
+def findings_parts(verdicts: Iterable[str], listings: Iterable[Listing]) -> Iterator[str]:
+    """What a study found: its sentences, then its tables."""
+    for sentence in verdicts:
+        yield f"<p>{escape(sentence)}</p>"
+    for listing in listings:
+        yield from _listing_part(listing)
+
+
+def _listing_part(listing: Listing) -> Iterator[str]:
     styles = ["left" if column < listing.left else "" for column in range(len(listing.names))]
     return table_part(
         map(head, listing.names, listing.units, styles),

@@ -118,8 +118,20 @@ class CampaignRequest:
     jitter: bool = True  # where the kind repeats its trials with moved positions
 
 
-def _records_none(table: pl.DataFrame) -> list[str]:
-    return []
+def ranked(*among: pl.Expr, **by: bool) -> Callable[[pl.DataFrame], list[str]]:
+    """Ranks trials that did not fail: gives their keys, the first to look at first.
+
+    Args:
+        among: which trials; left out: all.
+        by: columns to sort by, true where the largest comes first; equal ones are sorted by key.
+    """
+
+    def keys(table: pl.DataFrame) -> list[str]:
+        own = table.filter(pl.col("error").is_null(), *among)
+        order = own.sort(*by, "key", descending=[*by.values(), False], nulls_last=True)
+        return order["key"].to_list()
+
+    return keys
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,7 +146,7 @@ class CampaignKind:
     verdicts: Callable[[Summary], Iterator[str]]  # a sentence each, from the numbers
     figures: Callable[[pl.DataFrame, Summary], dict[str, Figure]]  # by file
     captions: Callable[[Summary], dict[str, str]]  # of the same files
-    worst: Callable[[pl.DataFrame], list[str]] = _records_none  # keys of trials, the worst first
+    worst: Callable[[pl.DataFrame], list[str]] = lambda _: []  # keys of trials, the worst first
     worst_of: str = "all trials"  # among which these are looked for, and by what
     pages: Callable[[Summary], dict[str, str]] = lambda _: {}  # further text, by file
     runs: int = 100  # default of the request
@@ -212,11 +224,10 @@ class CampaignPlan:
             columns: names of the numbers that it gives.
             notes: on how the trials came about.
         """
-        description = {
-            "kind": self._kind, "seed": self._request.seed, "scenarios": list(self.scenarios),
-            "set": list(self._request.overrides), **self._digests,
-        }  # fmt: skip
         return Campaign(
-            description=description, trials=self.trials, perform=perform, columns=columns,
-            notes=notes,
+            description={
+                "kind": self._kind, "seed": self._request.seed, "scenarios": list(self.scenarios),
+                "set": list(self._request.overrides), **self._digests,
+            },
+            trials=self.trials, perform=perform, columns=columns, notes=notes,
         )  # fmt: skip

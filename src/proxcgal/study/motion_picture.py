@@ -67,8 +67,7 @@ def motion_picture(
             frame = Image.new("RGB", (PANE[0] * len(recordings), PANE[1] + STRIP), "white")
             for column, (snapshot, recording) in enumerate(zip(moment, recordings, strict=True)):
                 note = "  (the least)" if row == stills and column == nearest else ""
-                pane = _pane(world, camera, snapshot, recording, note)
-                frame.paste(pane, (column * PANE[0], 0))
+                frame.paste(_pane(world, camera, snapshot, recording, note), (column * PANE[0], 0))
             frames.append(frame)
             if on_progress is not None:
                 on_progress((row + 1) / len(times))

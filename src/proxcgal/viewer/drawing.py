@@ -112,11 +112,9 @@ class Drawing:
 
     def remove(self) -> None:
         """Takes every node away."""
-        for handle in (*self._links, *self._solids, self._arrow):
+        own = () if self._ghost else (self._kept, self._held, self._removed, self._goal)
+        for handle in (*self._links, *self._solids, self._arrow, *own):
             handle.remove()
-        if not self._ghost:
-            for handle in (self._kept, self._held, self._removed, self._goal):
-                handle.remove()
 
     def _link(self, row: int, link: str) -> Any:
         vertices_L, triangles = self.model.meshes[row]

@@ -184,8 +184,7 @@ class LivePage:
         if now >= self._plotted + 1.0 / PLOT_HZ:
             self._plotted = now
             kept = self._preparation.busy or now < self._noted + _NOTE_S
-            note = self._note if kept else ""
-            self._panel.status(update, note)
+            self._panel.status(update, self._note if kept else "")
             self._panel.plots.show(*self.bounds)
 
 

@@ -31,8 +31,7 @@ class AllowedControls:
 
     def add_button(self, label: str, work: Callable[[], None]) -> Any:
         """A button that does some work."""
-        button = self._server.gui.add_button(label)
-        self._access.allow_control(button, switch)
+        button = self._access.allow_control(self._server.gui.add_button(label), switch)
 
         async def clicked(_: Any) -> None:
             work()
@@ -53,13 +52,11 @@ class AllowedControls:
     def add_list(self, label: str, options: Sequence[str], value: str) -> Any:
         """A list to choose from."""
         control = self._server.gui.add_dropdown(label, tuple(options), initial_value=value)
-        self._access.allow_control(control, one_of(options))
-        return control
+        return self._access.allow_control(control, one_of(options))
 
     def add_switch(self, label: str, value: bool, work: Callable[[bool], None] | None) -> Any:
         """A check box, with the work that each change of it does."""
-        control = self._server.gui.add_checkbox(label, value)
-        self._access.allow_control(control, switch)
+        control = self._access.allow_control(self._server.gui.add_checkbox(label, value), switch)
         if work is not None:
 
             async def changed(event: Any) -> None:
@@ -72,8 +69,7 @@ class AllowedControls:
         """A slider; its least, most and step, which its value may widen."""
         low, high, step = min(bounds[0], value), max(bounds[1], value), bounds[2]
         control = self._server.gui.add_slider(label, low, high, step, value)
-        self._access.allow_control(control, between(low, high))
-        return control
+        return self._access.allow_control(control, between(low, high))
 
 
 class Panel(AllowedControls):
@@ -139,8 +135,9 @@ class Panel(AllowedControls):
         self._of_model.append(self._handle(model))
         folder = self._server.gui.add_folder(title)
         with folder:
-            names = list(dict.fromkeys(model.draggable))
-            self._which = self.add_list("drag", names, first_draggable(model))
+            self._which = self.add_list(
+                "drag", list(dict.fromkeys(model.draggable)), first_draggable(model)
+            )
             self._which.on_update(self._other_chosen)
             self.add_button("let go", self._release)
         self._of_model.append(folder)

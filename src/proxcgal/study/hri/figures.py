@@ -164,8 +164,9 @@ def _subjects(main: pl.DataFrame, paper: Paper) -> Figure:
         )
         for name in names
     ]  # fmt: skip
-    plain: dict[str, Any] = {"linestyle": "", "fillstyle": "none"}
-    handles.append(Line2D([], [], color=GREY, marker="D", label="ours, seen", **plain))
+    handles.append(
+        Line2D([], [], color=GREY, marker="D", linestyle="", fillstyle="none", label="ours, seen")
+    )
     if any(name in paper.get(row, {}) for row in rows for name in names):
         handles.append(_printed_handle("black"))
     legend_below(figure, handles)

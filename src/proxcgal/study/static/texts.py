@@ -126,11 +126,10 @@ def _sureness(paired: Summary) -> str:
 
 def captions(summary: Summary) -> dict[str, str]:
     """What the figures show."""
-    texts = {}
-    for scene in summary["scenes"]:
-        texts[scene_file(scene)] = f"{scene}: {_CAPTION}"
-        texts[memory_file(scene)] = f"{scene}: {_MEMORY_CAPTION}"
-    return texts
+    kinds = ((scene_file, _CAPTION), (memory_file, _MEMORY_CAPTION))
+    return {
+        file(scene): f"{scene}: {caption}" for scene in summary["scenes"] for file, caption in kinds
+    }
 
 
 _MEMORY_CAPTION = (

@@ -41,15 +41,15 @@ def trip_figure(log: WalkLog, *, title: str, window: Sequence[float] | None = No
         window: [s] of the magnification; left out: round the stop.
     """
     trip = log.trips[0]
+    watched = {
+        "distance": (log.distance, log.distance_limit, "distance [m]"),
+        "relative_velocity": (log.velocity, log.velocity_limit, "relative velocity [m/s]"),
+        "joint_speed": (log.speed_ratio, 1.0, "joint speed, of its bound [-]"),
+        "joint_acceleration": (log.acceleration_ratio, 1.0, "joint accel., of its bound [-]"),
+    }
     rows = [(log.tcp_speed, log.tcp_limit, "tool speed [m/s]", trip.function == "tcp_speed")]
-    if trip.function == "distance":
-        rows.insert(0, (log.distance, log.distance_limit, "distance [m]", True))
-    elif trip.function == "relative_velocity":
-        rows.insert(0, (log.velocity, log.velocity_limit, "relative velocity [m/s]", True))
-    elif trip.function == "joint_speed":
-        rows.insert(0, (log.speed_ratio, 1.0, "joint speed, of its bound [-]", True))
-    elif trip.function == "joint_acceleration":
-        rows.insert(0, (log.acceleration_ratio, 1.0, "joint accel., of its bound [-]", True))
+    if trip.function in watched:
+        rows.insert(0, (*watched[trip.function], True))
     inside = (trip.time_s - _BEFORE, trip.time_s + _AFTER) if window is None else window
     figure = new_figure(8.4, 1.0 + 2.3 * len(rows), title)
     axes = figure.subplots(len(rows), 2, squeeze=False, width_ratios=(1.5, 1.0), sharey="row")
@@ -165,8 +165,7 @@ def ratings_figure(ratings: Mapping[str, Sequence[float]]) -> Figure:
             meanprops={"marker": "^", "markerfacecolor": GREEN, "markeredgecolor": GREEN},
         )  # fmt: skip
         box.set(ylim=(-0.5, 10.5), ylabel=f"{name}\nrating, 0 to 10")
-        edges = np.arange(-0.5, 11.0)
-        share = np.histogram(values, edges)[0] / max(len(values), 1)
+        share = np.histogram(values, np.arange(-0.5, 11.0))[0] / max(len(values), 1)
         bars.bar(np.arange(11), share, color=BLUE, width=0.8)
         bars.set(xlabel="rating", ylabel="share of testers", xticks=range(11))
         tidy_axes(box, bars)
@@ -203,8 +202,8 @@ def figures(table: pl.DataFrame, _: Summary | None = None) -> dict[str, Figure]:
             color=GREY,
         )
         most = done[column].drop_nulls().max()  # what is over the bound must be seen
-        ax.set_xlim(0.0, max(1.15 * bound, 1.05 * float(most or 0.0)))  # type: ignore[arg-type]
-        ax.set_xlabel(label, fontsize=10)
+        farthest = max(1.15 * bound, 1.05 * float(most or 0.0))  # type: ignore[arg-type]
+        ax.set(xlim=(0.0, farthest), xlabel=label)
         tidy_axes(ax)
     figure.axes[0].set(ylabel="share of stops [-]", ylim=(0.0, 1.04))
     handles, labels = figure.axes[0].get_legend_handles_labels()
