@@ -73,7 +73,7 @@ def run_command(options: RunOptions, command: str) -> int:
     """Runs the trials; prints the table and the report's path."""
     from proxcgal.report.write_report import write_report
     from proxcgal.scenario.loading import load_scenario
-    from proxcgal.study.runs.run import run_scenario
+    from proxcgal.study.runs.scenes import run_scenario
 
     if options.controller == ():
         raise ConfigError(

@@ -119,9 +119,12 @@ def _introduction(runs: Sequence[StoredRun]) -> Iterator[str]:
             f"<p>{escape(who)} beside the arm, which goes from way point to way point. True "
             "distances run from the person to the links that move.</p>"
         )
+    sent = "is sent to a goal that lies beyond an obstacle"
+    if len(beside) == len(runs):
+        sent = "goes from way point to way point"
     yield (
         f"<p>A simulated arm ({escape(robots)}, seed {escape(seeds)}) with rings of 8 x 8 zone "
-        f"time-of-flight sensors {_sent(runs)}. Each scene is run "
+        f"time-of-flight sensors {sent}. Each scene is run "
         "by the controllers below. "
         + " ".join(f"{text}." for name, text in _MOVES.items() if name in ran)
         + "</p>"
@@ -142,12 +145,6 @@ _MOVES = {
 
 def _beside_a_person(run: StoredRun) -> bool:
     return any(numbers.mean_m for numbers in run.summary.controllers.values())
-
-
-def _sent(runs: Sequence[StoredRun]) -> str:
-    if all(_beside_a_person(run) for run in runs):
-        return "goes from way point to way point"
-    return "is sent to a goal that lies beyond an obstacle"
 
 
 def _phases(run: StoredRun) -> Iterator[str]:

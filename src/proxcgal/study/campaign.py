@@ -20,7 +20,7 @@ from proxcgal.models.robots import Robot
 from proxcgal.scenario.scenario import Scenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.study.campaign_store import Outcome, Row, Value
-from proxcgal.study.trial_simulation import robot_of, scene_digests
+from proxcgal.study.trial_simulation import robot_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -190,7 +190,11 @@ class CampaignPlan:
         if file_name(name) in self._names:
             raise ConfigError(f"--scenario {source}: there is another one {by} {name}")
         self._names.add(file_name(name))
-        self._digests |= scene_digests(base, setup.robot)
+        scene = hashlib.sha256(base.to_toml().encode()).hexdigest()[:16]
+        self._digests |= {
+            f"scene {base.name}": scene,
+            f"robot of {base.name}": setup.robot.digest,
+        }
         return setup
 
     def add_robot(self, name: str, robot: Robot) -> None:

@@ -36,7 +36,7 @@ def perform_trials(
     store: CampaignStore,
     pool: Pool,
     on_progress: Callable[[list[float]], None] | None = None,
-    on_done: Callable[[Trial, Outcome], None] | None = None,
+    on_done: Callable[[Trial, Outcome], None] = lambda *_: None,
 ) -> list[Ended]:
     """Performs every unfinished trial; one that fails is kept with its error and stops nothing.
 
@@ -58,8 +58,7 @@ def perform_trials(
 
     def done(row: int, outcome: Outcome) -> None:
         store.put(outcome)
-        if on_done is not None:
-            on_done(todo[row], outcome)
+        on_done(todo[row], outcome)
 
     def lost(row: int, deaths: int) -> Outcome:
         times = {1: "once", 2: "twice"}.get(deaths, f"{deaths} times")

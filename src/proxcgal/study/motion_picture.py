@@ -38,7 +38,7 @@ STRIP = 48  # [px] of text below it
 def motion_picture(
     recordings: Sequence[Recording],
     folder: Path,
-    on_progress: Callable[[float], None] | None = None,
+    on_progress: Callable[[float], None] = lambda _: None,
 ) -> None:
     """Writes a GIF of one scene under several controllers, side by side, and one frame of it.
 
@@ -69,8 +69,7 @@ def motion_picture(
                 note = "  (the least)" if row == stills and column == nearest else ""
                 frame.paste(_pane(world, camera, snapshot, recording, note), (column * PANE[0], 0))
             frames.append(frame)
-            if on_progress is not None:
-                on_progress((row + 1) / len(times))
+            on_progress((row + 1) / len(times))
     finally:
         world.close()
     with tempfile.TemporaryDirectory(prefix=DRAWING, dir=folder) as half:

@@ -1,6 +1,5 @@
 """One trial, in whichever process: the robot loaded once, the run measured or recorded."""
 
-import hashlib
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -100,12 +99,6 @@ def robot_of(scenario: Scenario, digest: str | None = None) -> Robot:
             "or meshes differ"
         )
     return robot
-
-
-def scene_digests(base: Scenario, robot: Robot) -> dict[str, str]:
-    """Digests of a scene and its robot, by name: part of the description of a campaign."""
-    scene = hashlib.sha256(base.to_toml().encode()).hexdigest()[:16]
-    return {f"scene {base.name}": scene, f"robot of {base.name}": robot.digest}
 
 
 def simulate_all(

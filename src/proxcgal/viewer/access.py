@@ -59,7 +59,8 @@ class AccessControl:
             return self._refuse("pages of other origins may not connect")
         if not self._has_token(request):
             return self._refuse("a token is needed: open the address that `proxcgal` printed")
-        if _upgrades(request) and self.viewers >= self.bounds.viewers:
+        upgrade = request.headers.get("Upgrade", "").lower() == "websocket"
+        if upgrade and self.viewers >= self.bounds.viewers:
             return self._refuse(
                 f"{self.bounds.viewers} pages look on already", http.HTTPStatus.SERVICE_UNAVAILABLE
             )
@@ -110,10 +111,6 @@ class AccessControl:
         headers = Headers({"Content-Type": "text/plain; charset=utf-8", "Connection": "close",
                            "Content-Length": str(len(body))})  # fmt: skip
         return Response(status.value, status.phrase, headers, body)
-
-
-def _upgrades(request: Request) -> bool:
-    return request.headers.get("Upgrade", "").lower() == "websocket"
 
 
 def _name(host: str) -> str:
