@@ -9,8 +9,7 @@ from browser import Tab, chromium
 
 import proxcgal as px
 from proxcgal.cli import main
-from proxcgal.study.campaign import Campaign
-from proxcgal.study.campaign_kind import CampaignRequest
+from proxcgal.study.campaign import Campaign, CampaignRequest
 from proxcgal.study.static import campaign as static_campaign
 
 SHARED_ROBOTS = Path(__file__).parents[2] / "shared" / "robots"

@@ -2,12 +2,11 @@
 
 import pytest
 
-from proxcgal.study.campaign import Ended
-from proxcgal.study.campaign_kind import CampaignRequest
+from proxcgal.study.campaign import CampaignRequest, Ended
 from proxcgal.study.campaign_store import Outcome
+from proxcgal.study.execution import parquet_bytes, trials_table
 from proxcgal.study.kinds import KINDS
 from proxcgal.study.plotting import png
-from proxcgal.study.trials_table import parquet_bytes, trials_table
 
 FEWEST = {
     "static": CampaignRequest(runs=1, seed=0, scenarios=("front_plane",)),

@@ -16,7 +16,7 @@ from proxcgal.cli import main
 from proxcgal.recording.reader import read_recording
 from proxcgal.recording.replay import first_difference
 from proxcgal.scenario.loading import load_scenario
-from proxcgal.study.campaign_picture import draw_moving
+from proxcgal.study.motion_picture import draw_moving
 from proxcgal.study.workers import Pool
 from proxcgal.study.worst_recordings import record_worst
 

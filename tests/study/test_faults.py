@@ -18,8 +18,7 @@ from proxcgal.scenario.fault_keys import INPUT_FAULTS, Fault
 from proxcgal.scenario.loading import load_scenario
 from proxcgal.sim.faults import FaultInjector
 from proxcgal.sim.tick import TickInput
-from proxcgal.study.campaign import Trial
-from proxcgal.study.campaign_kind import CampaignRequest
+from proxcgal.study.campaign import CampaignRequest, Trial
 from proxcgal.study.faults.campaign import KIND, perform, plan
 from proxcgal.study.faults.cases import ROWS
 from proxcgal.study.faults.reliability_page import GOALS, reliability_page

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from proxcgal.study.timing.grid import TimingCell, formula, growth
-from proxcgal.study.timing.growth import fit_growth, student_quantile
+from proxcgal.study.timing.grid import TimingCell, fit_growth, formula, growth, student_quantile
 
 
 def made_cells(time: Callable[[float, float], float]) -> list[TimingCell]:

@@ -17,7 +17,7 @@ from proxcgal.scene.human.motion import move
 from proxcgal.scene.human.recorded import write_motion
 from proxcgal.scene.human.subject import draw_subject
 from proxcgal.sim.waypoints import Waypoints
-from proxcgal.study.campaign_kind import CampaignRequest
+from proxcgal.study.campaign import CampaignRequest
 from proxcgal.study.hri import campaign as hri_campaign
 from proxcgal.study.hri.figures import figures
 from proxcgal.study.hri.layouts import JITTER_M, draw_layout

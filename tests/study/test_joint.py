@@ -9,7 +9,7 @@ import pytest
 
 from proxcgal.core.errors import ConfigError
 from proxcgal.scenario.scenario import CONTROLLERS
-from proxcgal.study.campaign_kind import CampaignRequest
+from proxcgal.study.campaign import CampaignRequest
 from proxcgal.study.joint.campaign import KIND, PERCEPTIONS, SCENES, STACKS
 from proxcgal.study.joint.texts import listings, verdicts
 

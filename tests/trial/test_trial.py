@@ -28,9 +28,8 @@ from proxcgal.sim.faults import FaultInjector
 from proxcgal.sim.range_sensor import NO_TARGET, VALID
 from proxcgal.sim.tick import TickInput
 from proxcgal.sim.world import World
-from proxcgal.study.campaign_picture import _draw
-from proxcgal.study.runs.simulation import warn_of_stopped
-from proxcgal.study.trial_simulation import simulate_trial
+from proxcgal.study.motion_picture import _draw
+from proxcgal.study.trial_simulation import simulate_trial, warn_of_stopped
 from proxcgal.trial.trial import run_trial
 
 SHORT = ["duration=1.0"]

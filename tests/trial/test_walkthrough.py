@@ -26,10 +26,8 @@ from proxcgal.scenario.walkthrough_keys import LegKeys
 from proxcgal.scenario.walkthrough_scenario import GuidedScenario, WalkScenario
 from proxcgal.sim.physics import Physics
 from proxcgal.study.plotting import GREY
-from proxcgal.study.runs.walkthrough import walkthrough_lines
-from proxcgal.study.walkthrough.figures import trip_figure
-from proxcgal.study.walkthrough.ratings import read_ratings
-from proxcgal.study.walkthrough.stops_figure import figures
+from proxcgal.study.runs.walkthrough import read_ratings, walkthrough_lines
+from proxcgal.study.walkthrough.figures import figures, trip_figure
 from proxcgal.trial.trial import run_trial
 from proxcgal.trial.walkthrough import playback
 from proxcgal.trial.walkthrough.guided_source import off_path

@@ -28,8 +28,8 @@ from proxcgal.trial.interactive import LiveTrial
 from proxcgal.trial.trial import run_trial
 from proxcgal.viewer.choice import Choice, robots
 from proxcgal.viewer.command_queue import ROOM, CommandQueue
+from proxcgal.viewer.live_page import Preparation
 from proxcgal.viewer.messages import Request, Update
-from proxcgal.viewer.preparation import Preparation
 from proxcgal.viewer.simulation import run_simulation
 
 RNG = np.random.default_rng(1)

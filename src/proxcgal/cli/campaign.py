@@ -94,7 +94,7 @@ class CampaignOptions:
 def campaign_command(options: CampaignOptions, command: str) -> int:
     """Runs what is unfinished; prints tables, what was kept, what failed, the report's path."""
     from proxcgal.report.write_report import write_report
-    from proxcgal.study.campaign_kind import CampaignRequest
+    from proxcgal.study.campaign import CampaignRequest
     from proxcgal.study.campaign_run import CampaignEffort, print_campaign, run_campaign
     from proxcgal.study.kinds import KINDS
 
@@ -126,10 +126,11 @@ def _recorded(options: CampaignOptions) -> int:
     form, _, kept = options.keep.partition(":")
     if options.keep != "none" and not (form == "worst" and kept.isdecimal()):
         problems.append(f"--keep {options.keep}: must be worst:N, such as worst:5, or none")
-    for name in ("runs", "subjects"):
-        count = getattr(options, name)
-        if count is not None and count < 1:
-            problems.append(f"--{name} {count}: must be 1 or more")
+    problems += [
+        f"--{name} {count}: must be 1 or more"
+        for name, count in (("runs", options.runs), ("subjects", options.subjects))
+        if count is not None and count < 1
+    ]
     if options.kind != "hri":
         own = {
             "subjects": options.subjects, "controller": options.controller,

@@ -57,6 +57,11 @@ def coverage_command(options: CoverageOptions, command: str) -> int:
         raise ConfigError(
             f"--at {options.at:g}: must be between 0 and the scenario's {scenario.duration:g} s"
         )
-    folder = options.out or Path("out") / "coverage"
-    run_coverage(scenario, options.controller, options.at, folder, quiet=options.quiet)
+    run_coverage(
+        scenario,
+        options.controller,
+        options.at,
+        options.out or Path("out/coverage"),
+        quiet=options.quiet,
+    )
     return 0

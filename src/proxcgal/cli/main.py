@@ -96,8 +96,8 @@ def call(command: str, arguments: Sequence[str]) -> int:
         _print_problems(str(error))
         return BAD_INPUT
     run: Callable[[Any, str], int] = getattr(import_module(COMMANDS[command]), f"{command}_command")
-    text = shlex.join(("proxcgal", command, *arguments))  # for reports
-    return guarded(lambda: run(options, text))
+    # The command as typed is for reports.
+    return guarded(lambda: run(options, shlex.join(("proxcgal", command, *arguments))))
 
 
 def parse_options(command: str, arguments: Sequence[str]) -> Any:

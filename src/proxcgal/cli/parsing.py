@@ -62,7 +62,7 @@ def _line(options_type: type, program: str, arguments: Sequence[str], box: str) 
     """The parser's message as one line in our form; as it is where it is of another kind."""
     if found := re.match(r"Unrecognized options: (.*?)(?: Perhaps| Similar|$)", box):
         word = found[1].split(", ")[0]
-        names = [_option(field.name) for field in fields(options_type)]
+        names = [f"--{field.name.replace('_', '-')}" for field in fields(options_type)]
         near = difflib.get_close_matches(word.partition("=")[0], names, n=1, cutoff=0.7)
         hint = f"; did you mean {near[0]}?" if near else f"; {program} --help tells what there is"
         return f"{word}: not known{hint}"
@@ -115,10 +115,6 @@ def _field(options_type: type, name: str) -> str | None:
     """The field that an option or a positional argument goes to; None where there is none."""
     plain = name.lstrip("-").replace("-", "_").lower()
     return plain if name and plain in {field.name for field in fields(options_type)} else None
-
-
-def _option(field: str) -> str:
-    return f"--{field.replace('_', '-')}"
 
 
 def _shown(options_type: type, name: str) -> str:

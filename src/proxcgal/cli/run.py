@@ -73,7 +73,7 @@ def run_command(options: RunOptions, command: str) -> int:
     """Runs the trials; prints the table and the report's path."""
     from proxcgal.report.write_report import write_report
     from proxcgal.scenario.loading import load_scenario
-    from proxcgal.study.runs.run import run_scenario
+    from proxcgal.study.runs.scenes import run_scenario
 
     if options.controller == ():
         raise ConfigError(
@@ -126,11 +126,11 @@ def overrides(options: RunOptions) -> list[str]:
     changes = []
     if options.robot is not None:
         path = Path(options.robot).expanduser()
-        is_file = is_robot_file(path)
-        changes.append("robot=" + json.dumps(str(path.absolute()) if is_file else options.robot))
-    inputs = flat(options.package_dir, "--package-dir")
-    folders = [str(path.expanduser().absolute()) for path in inputs]
-    if folders:
+        robot = str(path.absolute()) if is_robot_file(path) else options.robot
+        changes.append(f"robot={json.dumps(robot)}")
+    if folders := [
+        str(path.expanduser().absolute()) for path in flat(options.package_dir, "--package-dir")
+    ]:
         changes.append("package_dirs=" + json.dumps(folders))
     if options.subject is not None:
         changes.append(f"operator.subject={options.subject}")

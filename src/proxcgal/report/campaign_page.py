@@ -5,11 +5,10 @@ from collections.abc import Iterator
 from html import escape
 from pathlib import Path
 
-from proxcgal.report.document import Pictures, document, origin_part
-from proxcgal.report.html_table import listing_part
+from proxcgal.report.document import Pictures, document, findings_parts, origin_part
 from proxcgal.report.replays import Replays
 from proxcgal.report.stored_results import StoredResults
-from proxcgal.study.campaign_kind import CampaignKind
+from proxcgal.study.campaign import CampaignKind
 from proxcgal.study.worst_recordings import FOLDER
 
 
@@ -22,10 +21,7 @@ def _parts(kind: CampaignKind, stored: StoredResults) -> Iterator[str]:
     summary = stored.summary
     text = kind.introduction
     yield f"<p>{escape(text if isinstance(text, str) else text(summary))}</p>"
-    for sentence in kind.verdicts(summary):
-        yield f"<p>{escape(sentence)}</p>"
-    for listing in kind.listings(summary):
-        yield from listing_part(listing)
+    yield from findings_parts(kind.verdicts(summary), kind.listings(summary))
     replays = Replays()
     worst = _replay_of_worst(stored, replays)
     pictures = Pictures(replays.used)

@@ -1,4 +1,4 @@
-"""The frame of every report: one HTML file, no network, no other file; all text escaped."""
+"""The frame and the tables of every report: one HTML file, no network; all text escaped."""
 
 import base64
 from collections.abc import Iterable, Iterator
@@ -6,8 +6,8 @@ from html import escape
 from importlib import resources
 from pathlib import Path
 
-from proxcgal.report.html_table import cell
 from proxcgal.report.stored_results import About
+from proxcgal.study.campaign import Listing
 
 PAGE_BYTES = 10_000_000  # of the whole page
 PICTURE_BYTES = PAGE_BYTES - 400_000  # of all its pictures; the rest is text
@@ -57,8 +57,63 @@ class Pictures:
         kind = "gif" if path.suffix == ".gif" else "png"
         data = base64.b64encode(path.read_bytes()).decode()
         alt = escape(caption.split(". ")[0], quote=True)
-        image = f'<img src="data:image/{kind};base64,{data}" alt="{alt}">'
-        return f"<figure>{image}<figcaption>{escape(caption)}</figcaption></figure>"
+        return (
+            f'<figure><img src="data:image/{kind};base64,{data}" alt="{alt}">'
+            f"<figcaption>{escape(caption)}</figcaption></figure>"
+        )
+
+
+def table_part(
+    heads: Iterable[str], rows: Iterable[Iterable[str]], caption: str = ""
+) -> Iterator[str]:
+    """A table that scrolls by itself where the page is narrower.
+
+    Args:
+        heads: of the columns, as `head` gives them.
+        rows: cells as `cell` gives them.
+        caption: above it; none where it is empty.
+    """
+    above = f"<caption>{escape(caption)}</caption>" if caption else ""
+    yield f'<div class="scroll"><table>{above}<thead><tr>'
+    yield from heads
+    yield "</tr></thead><tbody>"
+    for row in rows:
+        yield "<tr>" + "\n".join(row) + "\n</tr>"
+    yield "</tbody></table></div>"
+
+
+def head(name: str, unit: str = "", style: str = "") -> str:
+    """A column's head. Args: its name, its unit, a class of the style sheet."""
+    small = f"<small>{escape(unit)}</small>" if unit else ""
+    return f"<th{_class(style)}>{escape(name)}{small}</th>"
+
+
+def cell(text: object, style: str = "", *, rows: int | None = None, bold: bool = False) -> str:
+    """A cell. Args: its text, a class of the style sheet, how many rows it spans, in bold?"""
+    span = f' rowspan="{rows}"' if rows else ""
+    inner = escape(str(text))
+    return f"<td{_class(style)}{span}>{f'<b>{inner}</b>' if bold else inner}</td>"
+
+
+def findings_parts(verdicts: Iterable[str], listings: Iterable[Listing]) -> Iterator[str]:
+    """What a study found: its sentences, then its tables."""
+    for sentence in verdicts:
+        yield f"<p>{escape(sentence)}</p>"
+    for listing in listings:
+        yield from _listing_part(listing)
+
+
+def _listing_part(listing: Listing) -> Iterator[str]:
+    styles = ["left" if column < listing.left else "" for column in range(len(listing.names))]
+    return table_part(
+        map(head, listing.names, listing.units, styles),
+        (map(cell, row, styles) for row in listing.rows),
+        listing.caption,
+    )
+
+
+def _class(style: str) -> str:
+    return f' class="{style}"' if style else ""
 
 
 def code_names(names: Iterable[str]) -> str:

@@ -3,8 +3,13 @@
 from collections.abc import Iterator
 from html import escape
 
-from proxcgal.report.document import Pictures, document, origin_part, recordings_part
-from proxcgal.report.html_table import listing_part
+from proxcgal.report.document import (
+    Pictures,
+    document,
+    findings_parts,
+    origin_part,
+    recordings_part,
+)
 from proxcgal.report.stored_results import StoredResults
 from proxcgal.study.joint.texts import listings, verdicts
 from proxcgal.study.runs.joint import FIGURE
@@ -21,11 +26,7 @@ def _parts(stored: StoredResults) -> Iterator[str]:
     for run in summary["runs"]:
         where = f"From {run['init']}, {run['perception']}, {', '.join(run['tasks'])}: "
         yield f"<p>{escape(where + run['outcome'] + ': ' + run['reason'])}.</p>"
-    for sentence in verdicts(summary):
-        yield f"<p>{escape(sentence)}</p>"
-    for listing in listings(summary):
-        if listing.rows:
-            yield from listing_part(listing)
+    yield from findings_parts(verdicts(summary), (each for each in listings(summary) if each.rows))
     yield Pictures().part(
         stored.folder / FIGURE,
         "Speed at the tool by each arm, activations of the tasks, true distance.",

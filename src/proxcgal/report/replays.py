@@ -7,8 +7,7 @@ from html import escape
 from pathlib import Path
 
 from proxcgal.core.errors import ProxError
-from proxcgal.viewer.export import viser_client
-from proxcgal.viewer.report_scene import replay_scene, still_scene
+from proxcgal.viewer.report_scene import replay_scene, still_scene, viser_client
 
 REPLAY_BYTES = 6_000_000  # of the page, at most, for the scenes and their player
 ORDER = ("wb", "wb_memory", "sm", "wb_known")  # the first that is there is drawn whole
@@ -56,14 +55,7 @@ class Replays:
             files = [path for path in there if path.is_file()][:_SHOWN]
         if not files:
             return ""
-        names: tuple[str, ...] = ()
-
-        def make() -> bytes:
-            nonlocal names
-            scene, names = replay_scene(files)
-            return scene
-
-        place = self._add(make)
+        place, names = self._add(lambda: replay_scene(files))
         if not place.startswith("scene"):
             return f'<p class="soft">No 3D replay: {escape(place)}</p>'
         others = f" The see-through arm: {escape(', '.join(names[1:]))}." if names[1:] else ""
@@ -78,7 +70,7 @@ class Replays:
 
     def of_scene(self, name: str) -> str:
         """The figure of a built-in scene that stands still; nothing where there is none."""
-        place = self._add(lambda: still_scene(name))
+        place, _ = self._add(lambda: (still_scene(name), ()))
         if not place.startswith("scene"):
             return ""
         return _figure(
@@ -97,19 +89,22 @@ class Replays:
             yield f'<script type="text/plain" id="scene{row}">{scene}</script>'
         yield f"<script>{_SCRIPT}</script>"
 
-    def _add(self, make: Callable[[], bytes]) -> str:
-        """The scene's place in the page, `scene` and a number; or why it has none."""
+    def _add(
+        self, make: Callable[[], tuple[bytes, tuple[str, ...]]]
+    ) -> tuple[str, tuple[str, ...]]:
+        """The scene's place in the page, `scene` and a number, or why it has none; its names."""
         try:
-            data = base64.b64encode(make()).decode()
+            scene, names = make()
         except ProxError as error:
-            return str(error)
+            return str(error), ()
+        data = base64.b64encode(scene).decode()
         if not self._player:
             # Nothing in it may end the element that it stands in.
             self._player = json.dumps(viser_client()).replace("<", "\\u003c")
         if self.used + len(data) > REPLAY_BYTES:
-            return f"it would take {len(data) / 1e6:.1f} MB more than the page may have"
+            return f"it would take {len(data) / 1e6:.1f} MB more than the page may have", ()
         self._scenes.append(data)
-        return f"scene{len(self._scenes) - 1}"
+        return f"scene{len(self._scenes) - 1}", names
 
 
 def _figure(place: str, label: str, caption: str) -> str:

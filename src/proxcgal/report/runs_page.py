@@ -5,8 +5,15 @@ from html import escape
 
 from proxcgal.core.tables import in_metres
 from proxcgal.evaluation.metrics import COVERAGE_KEYS, SELF_LIMIT_M
-from proxcgal.report.document import Pictures, document, origin_part, recordings_part
-from proxcgal.report.html_table import cell, head, table_part
+from proxcgal.report.document import (
+    Pictures,
+    cell,
+    document,
+    head,
+    origin_part,
+    recordings_part,
+    table_part,
+)
 from proxcgal.report.replays import Replays
 from proxcgal.report.stored_results import About, StoredNumbers, StoredRun
 from proxcgal.study.runs.pictures import SIDE_BY_SIDE
@@ -112,9 +119,12 @@ def _introduction(runs: Sequence[StoredRun]) -> Iterator[str]:
             f"<p>{escape(who)} beside the arm, which goes from way point to way point. True "
             "distances run from the person to the links that move.</p>"
         )
+    sent = "is sent to a goal that lies beyond an obstacle"
+    if len(beside) == len(runs):
+        sent = "goes from way point to way point"
     yield (
         f"<p>A simulated arm ({escape(robots)}, seed {escape(seeds)}) with rings of 8 x 8 zone "
-        f"time-of-flight sensors {_sent(runs)}. Each scene is run "
+        f"time-of-flight sensors {sent}. Each scene is run "
         "by the controllers below. "
         + " ".join(f"{text}." for name, text in _MOVES.items() if name in ran)
         + "</p>"
@@ -135,12 +145,6 @@ _MOVES = {
 
 def _beside_a_person(run: StoredRun) -> bool:
     return any(numbers.mean_m for numbers in run.summary.controllers.values())
-
-
-def _sent(runs: Sequence[StoredRun]) -> str:
-    if all(_beside_a_person(run) for run in runs):
-        return "goes from way point to way point"
-    return "is sent to a goal that lies beyond an obstacle"
 
 
 def _phases(run: StoredRun) -> Iterator[str]:

@@ -3,7 +3,7 @@
 import json
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -104,41 +104,23 @@ class SweepSummary(_Stored):
     growth: list[StoredGrowth] = []
 
 
-@dataclass(frozen=True, slots=True)
-class StoredRun:
-    """One scenario's folder."""
-
-    folder: Path
-    summary: StoredSummary
-    about: About = field(default_factory=About)
-    settings: str = ""  # scenario.toml: the resolved scenario
-
-
-@dataclass(frozen=True, slots=True)
-class StoredSweep:
-    """A timing grid's folder."""
-
-    folder: Path
-    summary: SweepSummary
-    about: About
-
-
-@dataclass(frozen=True, slots=True)
-class StoredResults:
-    """The folder of a campaign, its trials apart, of joint runs, or of a walk-through."""
-
-    folder: Path
-    summary: dict[str, Any]
-    about: About
-    settings: str  # scenario.toml; empty where there is none
-
-    @property
-    def path(self) -> Path:
-        """Of the summary."""
-        return self.folder / SUMMARY
-
-
 M = TypeVar("M", bound=BaseModel)
+S = TypeVar("S")
+
+
+@dataclass(frozen=True, slots=True)
+class Stored(Generic[S]):
+    """A folder of results."""
+
+    folder: Path
+    summary: S
+    about: About = field(default_factory=About)
+    settings: str = ""  # scenario.toml: the resolved scenario; empty where there is none
+
+
+StoredRun = Stored[StoredSummary]  # one scenario's
+StoredSweep = Stored[SweepSummary]  # a timing grid's
+StoredResults = Stored[dict[str, Any]]  # a campaign's, joint runs', or a walk-through's
 
 
 def read_results(folder: Path) -> StoredResults:
@@ -147,14 +129,13 @@ def read_results(folder: Path) -> StoredResults:
     Raises:
         ConfigError: no such folder, no summary in it, or files that cannot be read; all problems.
     """
-    summary = read_json(folder / SUMMARY)
-    return StoredResults(folder, summary, _about(folder), _settings(folder))
+    return Stored(folder, read_json(folder / SUMMARY), _about(folder), _settings(folder))
 
 
 def read_sweep(folder: Path) -> StoredSweep:
     """The timing grid of a folder. Raises: as `read_results`."""
     about = _about(folder)
-    return StoredSweep(folder, _model(SweepSummary, folder / SUMMARY), about)
+    return Stored(folder, _model(SweepSummary, folder / SUMMARY), about)
 
 
 def read_runs(folder: Path) -> tuple[list[StoredRun], About]:
@@ -179,8 +160,8 @@ def read_runs(folder: Path) -> tuple[list[StoredRun], About]:
 
 
 def _run(folder: Path) -> StoredRun:
-    summary = _model(StoredSummary, folder / SUMMARY)
-    return StoredRun(folder, summary, _about(folder), _settings(folder))
+    path = folder / SUMMARY
+    return Stored(folder, _model(StoredSummary, path), _about(folder), _settings(folder))
 
 
 def _about(folder: Path) -> About:

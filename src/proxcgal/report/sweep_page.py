@@ -3,8 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 from html import escape
 
-from proxcgal.report.document import Pictures, document, origin_part
-from proxcgal.report.html_table import cell, head, table_part
+from proxcgal.report.document import Pictures, cell, document, head, origin_part, table_part
 from proxcgal.report.replays import Replays
 from proxcgal.report.stored_results import Exponent, StoredCell, StoredSweep
 from proxcgal.study.timing.comparison import CYCLE_US, Comparison, compare, cycle_verdict

@@ -52,8 +52,7 @@ def _parts(stored: StoredResults) -> Iterator[str]:
     trips = summary["trips"]
     if trips and (paper := _PAPER.get(trips[0]["function"])):
         yield f"<p>The paper [WT], {escape(paper)}</p>"
-    caption = _TRIPPED if trips else _TAUGHT
-    yield Pictures().part(stored.folder / FIGURE, caption)
+    yield Pictures().part(stored.folder / FIGURE, _TRIPPED if trips else _TAUGHT)
     yield Pictures(3 * PICTURE_BYTES // 4).part(stored.folder / RATINGS, _RATED)
     pairs = ", ".join(map(str, summary["monitored_pairs"]))
     yield f"<p>Distance to the operator is monitored of: {escape(pairs)}.</p>"

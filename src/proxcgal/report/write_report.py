@@ -1,5 +1,6 @@
 """A folder of results becomes one self-contained HTML page."""
 
+import functools
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from proxcgal.report.campaign_page import campaign_page
 from proxcgal.report.joint_page import joint_page
 from proxcgal.report.runs_page import runs_page
 from proxcgal.report.stored_results import (
+    SUMMARY,
     StoredResults,
     read_json,
     read_results,
@@ -33,27 +35,25 @@ def write_report(folder: Path) -> Path:
     Raises:
         ConfigError: no such folder, no `summary.json` in it, or files that cannot be read.
     """
-    summary = read_json(folder / "summary.json")
+    path = folder / SUMMARY
+    summary = read_json(path)
     if "cells" in summary:
         text = sweep_page(read_sweep(folder))
     elif "campaign" in summary:
-        text = _campaign(read_results(folder))
+        name = summary["campaign"]
+        if name not in KINDS:
+            raise ConfigError(f"{path}: campaign = {name!r}: there are {', '.join(KINDS)}")
+        page = functools.partial(campaign_page, KINDS[name])
+        text = _checked(page, read_results(folder), f"a {name} campaign")
     elif "trips" in summary:
         text = _checked(walkthrough_page, read_results(folder), "a walk-through")
     elif "runs" in summary:
         text = _checked(joint_page, read_results(folder), "joint runs")
     else:
         text = runs_page(*read_runs(folder))
-    path = folder / "report.html"
-    write_text(path, text)
-    return path
-
-
-def _campaign(stored: StoredResults) -> str:
-    name = stored.summary["campaign"]
-    if name not in KINDS:
-        raise ConfigError(f"{stored.path}: campaign = {name!r}: there are {', '.join(KINDS)}")
-    return _checked(lambda it: campaign_page(KINDS[name], it), stored, f"a {name} campaign")
+    report = folder / "report.html"
+    write_text(report, text)
+    return report
 
 
 def _checked(page: Callable[[StoredResults], str], stored: StoredResults, what: str) -> str:
@@ -62,4 +62,6 @@ def _checked(page: Callable[[StoredResults], str], stored: StoredResults, what: 
         return page(stored)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         reason = f"{type(error).__name__}: {error}"
-        raise ConfigError(f"{stored.path}: not the summary of {what}: {reason}") from None
+        raise ConfigError(
+            f"{stored.folder / SUMMARY}: not the summary of {what}: {reason}"
+        ) from None

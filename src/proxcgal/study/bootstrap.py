@@ -1,17 +1,20 @@
-"""How sure a median is, a mean, or a ratio of sums."""
+"""How sure a median is, a mean, or a ratio of sums; controllers paired on the same draws."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import polars as pl
 
+from proxcgal.core.files import NOTHING_M
 from proxcgal.core.typing import Array
 
 RESAMPLES = 10_000
 CONFIDENCE = 0.95
 ENOUGH = 6  # values: of fewer, a resampled interval is no more than their range
 _PARTS = 20
+Distances = Mapping[str, Mapping[int, float]]  # [m] by controller, then by draw or subject
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,3 +76,45 @@ def _percentile_interval(middle: float, resampled: Array) -> Interval:
     tail = 50.0 * (1.0 - CONFIDENCE)
     low, high = np.percentile(resampled, [tail, 100.0 - tail])
     return Interval(middle, float(low), float(high))
+
+
+@dataclass(frozen=True, slots=True)
+class Pairs:
+    """Distances of what both controllers met, (n,) each [m]."""
+
+    one: Array
+    other: Array
+
+    @property
+    def apart_mm(self) -> list[float]:
+        """How much farther away the first is [mm]."""
+        return [float(apart) for apart in 1000.0 * (self.one - self.other)]
+
+
+def by_controller(table: pl.DataFrame, measure: str, each: str) -> Distances:
+    """One measure of a campaign's trials.
+
+    Args:
+        table: of one scene's trials.
+        measure: column of a distance [m].
+        each: column of the draw or subject.
+    """
+    return {
+        str(name): dict(part.select(each, measure).iter_rows())
+        for (name,), part in table.group_by(["controller"], maintain_order=True)
+    }
+
+
+def draw_distances(table: pl.DataFrame, measure: str = "true_final_m") -> Distances:
+    """One measure of the draws; trials that failed, or saw nothing to be distant from, left out."""
+    done = table.filter(pl.col("error").is_null(), pl.col(measure) < NOTHING_M)
+    return by_controller(done, measure, "draw")
+
+
+def pairs(distances: Distances, one: str, other: str) -> Pairs:
+    """Both controllers' distances, of the draws or subjects that both have."""
+    first, second = distances.get(one, {}), distances.get(other, {})
+    both = sorted(first.keys() & second.keys())
+    return Pairs(
+        np.array([first[each] for each in both]), np.array([second[each] for each in both])
+    )

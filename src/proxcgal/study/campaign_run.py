@@ -3,7 +3,6 @@
 import shlex
 import sys
 import time as clock
-from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,15 +13,13 @@ from proxcgal.core.progress import ProgressBar, announce
 from proxcgal.core.provenance import origin, versions
 from proxcgal.evaluation.metrics import Summary
 from proxcgal.recording.writer import RecordedTicks
-from proxcgal.study.campaign import Campaign, Ended, Trial
-from proxcgal.study.campaign_kind import CampaignKind, CampaignRequest
-from proxcgal.study.campaign_picture import draw_moving
+from proxcgal.study.campaign import Campaign, CampaignKind, CampaignRequest, Ended, Trial
 from proxcgal.study.campaign_store import CampaignStore, Outcome
-from proxcgal.study.execution import perform_trials, unfinished
+from proxcgal.study.execution import parquet_bytes, perform_trials, trials_table, unfinished
+from proxcgal.study.motion_picture import draw_moving
 from proxcgal.study.plotting import png
-from proxcgal.study.runs.setup_check import check_setup
+from proxcgal.study.runs.preparation import check_setup
 from proxcgal.study.trial_simulation import robot_of
-from proxcgal.study.trials_table import parquet_bytes, trials_table
 from proxcgal.study.workers import Pool, default_workers
 from proxcgal.study.worst_recordings import record_worst
 
@@ -100,7 +97,12 @@ def run_campaign(
         for file, text in kind.pages(summary).items():
             write_text(folder / file, text)
         write_bytes(folder / "trials.parquet", parquet_bytes(table))
-        write_json(folder / "run.json", origin(command) | _times(ended, begin))
+        times = {  # of this process alone, and of all trials whenever they ran
+            "wall_s": clock.monotonic() - begin,
+            "trials_wall_s": sum(e.outcome.wall_s for e in ended),
+            "simulated_s": sum(e.trial.scenario.duration for e in ended),
+        }
+        write_json(folder / "run.json", origin(command) | times)
         write_json(folder / "summary.json", summary)
     return summary
 
@@ -138,15 +140,6 @@ def _perform(
                 f"{kept} of {count} trials are kept in {folder}; the same command goes on from "
                 "there"
             ) from None
-
-
-def _times(ended: Sequence[Ended], begin: float) -> dict[str, float]:
-    """Wall time of this process alone, and of all trials whenever they ran."""
-    return {
-        "wall_s": clock.monotonic() - begin,
-        "trials_wall_s": sum(e.outcome.wall_s for e in ended),
-        "simulated_s": sum(e.trial.scenario.duration for e in ended),
-    }
 
 
 def print_campaign(kind: CampaignKind, summary: dict[str, Any], folder: Path) -> None:

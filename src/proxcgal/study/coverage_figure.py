@@ -41,8 +41,7 @@ def coverage_figure(
         nearest_W: (3,) [m] the scene's point that is truly closest; marked.
     """
     memory_s = setup.scenario.controller.memory.memory_s
-    q = postures[-1]
-    tool_W = np.asarray(setup.robot.tool_pose(q))[:3, 3]
+    tool_W = np.asarray(setup.robot.tool_pose(postures[-1]))[:3, 3]
     figure = new_figure(12.0, 4.6, title)
     axes = figure.subplots(1, 3, width_ratios=(1.25, 1.25, 1.0))
     level = float(tool_W[2] if nearest_W is None else nearest_W[2])

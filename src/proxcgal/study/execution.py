@@ -1,14 +1,17 @@
-"""All trials of a campaign brought to an end: performed on workers, each stored at once."""
+"""All trials of a campaign brought to an end, each stored at once; then their table."""
 
 import functools
+import io
 import time as clock
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+
+import polars as pl
 
 from proxcgal.core.errors import ConfigError, ProxError
 from proxcgal.core.progress import OnProgress
 from proxcgal.study.campaign import Campaign, Ended, Perform, Trial
-from proxcgal.study.campaign_store import CampaignStore, Outcome
+from proxcgal.study.campaign_store import CampaignStore, Outcome, Row
 from proxcgal.study.jobs import StoppedError
 from proxcgal.study.workers import Pool
 
@@ -33,7 +36,7 @@ def perform_trials(
     store: CampaignStore,
     pool: Pool,
     on_progress: Callable[[list[float]], None] | None = None,
-    on_done: Callable[[Trial, Outcome], None] | None = None,
+    on_done: Callable[[Trial, Outcome], None] = lambda *_: None,
 ) -> list[Ended]:
     """Performs every unfinished trial; one that fails is kept with its error and stops nothing.
 
@@ -55,8 +58,7 @@ def perform_trials(
 
     def done(row: int, outcome: Outcome) -> None:
         store.put(outcome)
-        if on_done is not None:
-            on_done(todo[row], outcome)
+        on_done(todo[row], outcome)
 
     def lost(row: int, deaths: int) -> Outcome:
         times = {1: "once", 2: "twice"}.get(deaths, f"{deaths} times")
@@ -91,3 +93,33 @@ def failure_text(problem: Exception) -> str:
     place = traceback.extract_tb(problem.__traceback__)[-1]
     at = f"{place.filename.rpartition('/')[2]}:{place.lineno}"
     return f"{type(problem).__name__}: {problem} ({at})"
+
+
+def trials_table(ended: Sequence[Ended], columns: Sequence[str]) -> pl.DataFrame:
+    """One row a trial in the campaign's order: what it is, its numbers, what it took.
+
+    Args:
+        ended: all trials.
+        columns: of the numbers; null where a trial failed.
+    """
+    rows: list[Row] = []
+    for each in ended:
+        trial, outcome = each.trial, each.outcome
+        numbers = outcome.row or {}
+        rows.append(
+            {"key": trial.key, "name": trial.name, **trial.tags}
+            | {"scenario": trial.scenario.name, "robot": trial.scenario.robot}
+            | {"controller": trial.controller, "seed": trial.seed}
+            | {column: numbers.get(column) for column in columns}
+            | {"error": outcome.error, "command": trial.command, "wall_s": outcome.wall_s}
+        )
+    table = pl.DataFrame(rows, schema_overrides={"error": pl.String}, infer_schema_length=None)
+    empty = [name for name in columns if table.schema[name] == pl.Null]  # all trials failed
+    return table.with_columns(pl.col(empty).cast(pl.Float64))
+
+
+def parquet_bytes(table: pl.DataFrame) -> bytes:
+    """The table as a Parquet file's bytes."""
+    buffer = io.BytesIO()
+    table.write_parquet(buffer)
+    return buffer.getvalue()

@@ -1,5 +1,6 @@
 """Messages between a job and its master process: the share done, and the request to stop."""
 
+import functools
 import os
 import signal
 import threading
@@ -56,11 +57,7 @@ class SharedProgress:
 
 def work(job: Job, path: str, row: int) -> Any:
     """One job in a worker process."""
-    progress = SharedProgress(Path(path), 0)
-
-    def report(share: float) -> None:
-        progress.report(row, share)
-
+    report = functools.partial(SharedProgress(Path(path), 0).report, row)
     report(0.0)
     return job(report)
 

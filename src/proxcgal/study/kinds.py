@@ -1,6 +1,6 @@
 """The kinds of campaign that there are."""
 
-from proxcgal.study.campaign_kind import CampaignKind
+from proxcgal.study.campaign import CampaignKind
 from proxcgal.study.faults import campaign as faults
 from proxcgal.study.hri import campaign as hri
 from proxcgal.study.joint import campaign as joint

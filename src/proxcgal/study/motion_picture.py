@@ -1,6 +1,8 @@
 """A moving picture of recorded runs: side by side, under one caption each."""
 
 import bisect
+import functools
+import shutil
 import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -10,14 +12,19 @@ import numpy as np
 from matplotlib import get_data_path
 from PIL import Image, ImageDraw, ImageFont
 
-from proxcgal.recording.reader import Recording
+from proxcgal.core.errors import ProxError
+from proxcgal.core.progress import OnProgress, ProgressBar
+from proxcgal.recording.reader import Recording, read_recording
 from proxcgal.recording.render import RecordedMoment, draw, recorded_moments, write_gif
 from proxcgal.scenario.hri_scenario import HriScenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.scene.solids import Box
 from proxcgal.sim.picture import Camera
 from proxcgal.sim.world import World
+from proxcgal.study.campaign import Trial
 from proxcgal.study.plotting import CONTROLLER_COLOURS, CONTROLLER_NAMES, GREY
+from proxcgal.study.trial_simulation import simulate_trial
+from proxcgal.study.workers import Pool
 
 MOVING, STILL = "motion.gif", "motion.png"
 DRAWING = ".drawing-"  # begins the name of a folder of unfinished files
@@ -31,7 +38,7 @@ STRIP = 48  # [px] of text below it
 def motion_picture(
     recordings: Sequence[Recording],
     folder: Path,
-    on_progress: Callable[[float], None] | None = None,
+    on_progress: Callable[[float], None] = lambda _: None,
 ) -> None:
     """Writes a GIF of one scene under several controllers, side by side, and one frame of it.
 
@@ -60,11 +67,9 @@ def motion_picture(
             frame = Image.new("RGB", (PANE[0] * len(recordings), PANE[1] + STRIP), "white")
             for column, (snapshot, recording) in enumerate(zip(moment, recordings, strict=True)):
                 note = "  (the least)" if row == stills and column == nearest else ""
-                pane = _pane(world, camera, snapshot, recording, note)
-                frame.paste(pane, (column * PANE[0], 0))
+                frame.paste(_pane(world, camera, snapshot, recording, note), (column * PANE[0], 0))
             frames.append(frame)
-            if on_progress is not None:
-                on_progress((row + 1) / len(times))
+            on_progress((row + 1) / len(times))
     finally:
         world.close()
     with tempfile.TemporaryDirectory(prefix=DRAWING, dir=folder) as half:
@@ -152,3 +157,48 @@ def _pane(
 def _font(*, bold: bool = False) -> Any:
     name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
     return ImageFont.truetype(Path(get_data_path()) / "fonts" / "ttf" / name, 14)
+
+
+def draw_moving(trials: Sequence[Trial], folder: Path, pool: Pool, *, quiet: bool) -> None:
+    """Draws `motion.gif` and one of its frames into a campaign's folder, unless they are there.
+
+    A machine that cannot draw off screen gets all the rest.
+
+    Args:
+        trials: of one scene, one after the other from the left.
+        folder: of the campaign, which is of one build: what is there is of these trials.
+        pool: a worker of this machine draws.
+        quiet: no progress on stderr.
+    """
+    for half in folder.glob(f"{DRAWING}*"):  # of a process that was killed
+        shutil.rmtree(half, ignore_errors=True)
+    if not trials or (folder / MOVING).is_file():
+        return
+    with ProgressBar("drawing", [1.0], "", quiet=quiet) as progress:
+        pool.run(
+            [functools.partial(_draw, list(trials), folder)],
+            progress.shares, lambda _, text: progress.finished(text), lambda *_: "no picture",
+        )  # fmt: skip
+
+
+def _draw(trials: Sequence[Trial], folder: Path, report: OnProgress) -> str:
+    steps = len(trials) + 1
+    with tempfile.TemporaryDirectory(prefix=DRAWING, dir=folder) as half:
+        try:
+            recordings = []
+            for row, trial in enumerate(trials):
+                path = Path(half) / f"{row}.mcap"
+
+                def part(share: float, done: int = row) -> None:
+                    report((done + share) / steps)
+
+                log = simulate_trial(
+                    trial.scenario, trial.controller, trial.seed, part, recording=path
+                )
+                if log.recording_failure:
+                    return f"no {MOVING}: {log.recording_failure}"
+                recordings.append(read_recording(path))
+            motion_picture(recordings, folder)
+        except ProxError as error:
+            return f"no {MOVING}: {error}"
+    return MOVING

@@ -57,8 +57,9 @@ def tidy_axes(*axes: Axes) -> None:
 
 def legend_below(figure: Figure, handles: Sequence[Artist], *, rows: int = 1) -> None:
     """Explains the labelled handles below all axes."""
-    columns = -(-len(handles) // rows)
-    figure.legend(handles=handles, loc="outside lower center", ncols=columns, **LEGEND)
+    figure.legend(
+        handles=handles, loc="outside lower center", ncols=-(-len(handles) // rows), **LEGEND
+    )
 
 
 def mark_thresholds(

@@ -71,10 +71,18 @@ def time_figure(
     if faults:
         shaded.append(Patch(color=GREY, alpha=0.15, label="fault"))
     if shaded:
-        names = [str(patch.get_label()) for patch in shaded]
-        place: dict[str, Any] = {"loc": "upper right", "handlelength": 1.4, "fontsize": 8}
         # Beside the axes' own legend, which keeps its room above them.
-        axes[0].add_artist(Legend(axes[0], shaded, names, frameon=False, **place))
+        axes[0].add_artist(
+            Legend(
+                axes[0],
+                shaded,
+                [str(patch.get_label()) for patch in shaded],
+                loc="upper right",
+                frameon=False,
+                handlelength=1.4,
+                fontsize=8,
+            )
+        )
     mark_signals(axes, signals)
     axes[-1].set(xlabel="time [s]", xlim=(0.0, max(_end(log) for log in logs)))
     tidy_axes(*axes)
@@ -83,42 +91,41 @@ def time_figure(
 
 def _distances(ax: Axes, logs: Sequence[TrialLog], d_min: float, buffer: float) -> None:
     mark_thresholds(ax, d_min, buffer, offset=5, fontsize=9, zorder=1)
-    highest = d_min + buffer
+    highest, handles = d_min + buffer, []
     for log in logs:
-        colour, width = CONTROLLER_COLOURS.get(log.controller, "black"), _width(log.controller)
+        style, known = _style(log), log.controller == "wb_known"
         true, seen = _gaps(log.true_m), _gaps(log.seen_m)
-        if log.controller != "wb_known":  # there the two hardly differ: one line says it
-            ax.plot(log.time, seen, color=colour, linewidth=width, zorder=_order(log.controller))
-        ax.plot(
-            log.time, true, color=colour, linewidth=width, linestyle=DASHED,
-            zorder=_order(log.controller),
-        )  # fmt: skip
+        if not known:  # there the two hardly differ: one line says it
+            ax.plot(log.time, seen, **style)
+        ax.plot(log.time, true, linestyle=DASHED, **style)
         highest = max([highest, *true[np.isfinite(true)], *seen[np.isfinite(seen)]])
+        handles.append(
+            Line2D(
+                [], [], color=style["color"], linewidth=1.4 * style["linewidth"],
+                linestyle=DASHED if known else "-",
+                label=CONTROLLER_NAMES.get(log.controller, log.controller),
+            )
+        )  # fmt: skip
     ax.set(ylim=(0.0, 1.06 * highest), ylabel="minimum distance [m]")
-    handles, labels = [], []
-    for log in logs:
-        dash: Any = DASHED if log.controller == "wb_known" else "-"
-        width = 1.4 * _width(log.controller)
-        colour = CONTROLLER_COLOURS.get(log.controller, "black")
-        handles.append(Line2D([], [], color=colour, linewidth=width, linestyle=dash))
-        labels.append(CONTROLLER_NAMES.get(log.controller, log.controller))
-    handles.append(Line2D([], [], color=GREY, linewidth=1.6))
-    handles.append(Line2D([], [], color=GREY, linewidth=1.6, linestyle=DASHED))
-    place: dict[str, Any] = {
-        "loc": "lower center",
-        "bbox_to_anchor": (0.5, 1.0),
-        "ncols": len(handles),
-    }
-    ax.legend(handles, [*labels, "seen", "true"], columnspacing=1.4, **place, **LEGEND)
+    handles += [
+        Line2D([], [], color=GREY, linewidth=1.6, label="seen"),
+        Line2D([], [], color=GREY, linewidth=1.6, linestyle=DASHED, label="true"),
+    ]
+    ax.legend(
+        handles=handles,
+        loc="lower center",
+        bbox_to_anchor=(0.5, 1.0),
+        ncols=len(handles),
+        columnspacing=1.4,
+        **LEGEND,
+    )
 
 
-def _width(controller: str) -> float:
+def _style(log: TrialLog) -> dict[str, Any]:
     """The whole body's lies under the others', wide enough to be seen on both sides."""
-    return {"wb": 1.9, "wb_known": 1.0}.get(controller, 1.0)
-
-
-def _order(controller: str) -> float:
-    return 2.0 if controller == "wb" else 3.0
+    width, order = (1.9, 2.0) if log.controller == "wb" else (1.0, 3.0)
+    colour = CONTROLLER_COLOURS.get(log.controller, "black")
+    return {"color": colour, "linewidth": width, "zorder": order}
 
 
 def _gaps(distance: Array) -> Array:
@@ -128,11 +135,7 @@ def _gaps(distance: Array) -> Array:
 
 def _activations(ax: Axes, logs: Sequence[TrialLog]) -> None:
     for log in logs:
-        colour = CONTROLLER_COLOURS.get(log.controller, "black")
-        ax.plot(
-            log.time, log.activation, color=colour, linewidth=_width(log.controller),
-            zorder=_order(log.controller),
-        )  # fmt: skip
+        ax.plot(log.time, log.activation, **_style(log))
     ax.set(ylim=(-0.05, 1.08), yticks=(0.0, 0.5, 1.0), ylabel="activation [-]")
 
 
@@ -152,24 +155,22 @@ def _modes(ax: Axes, logs: Sequence[TrialLog]) -> list[Patch]:
 
 def _links(ax: Axes, logs: Sequence[TrialLog], links: Sequence[str]) -> None:
     """One band a controller, coloured and labelled by the link that the avoidance moves."""
-    order: list[str] = []
-    for log in logs:
-        order += [link for link in dict.fromkeys(log.control_link) if link and link not in order]
-    known = [*links, *(link for link in order if link not in links)]
-    order.sort(key=known.index)
-    colours = {link: BANDS[known.index(link) % len(BANDS)] for link in order}
+    met = dict.fromkeys(link for log in logs for link in log.control_link if link)
+    known = dict.fromkeys([*links, *met])
+    colours = {link: BANDS[k % len(BANDS)] for k, link in enumerate(known) if link in met}
     duration = max(_end(log) for log in logs)
     labelled: set[str] = set()
     for row, log in enumerate(reversed(logs)):
-        for link, start, end in _spans(log):
-            colour = colours[link]
-            ax.broken_barh([(start, end - start)], (row - 0.38, 0.76), facecolors=colour)
+        for link, start, end in _stretches(log, np.asarray(log.control_link)):
+            if not link:
+                continue
+            ax.broken_barh([(start, end - start)], (row - 0.38, 0.76), facecolors=colours[link])
             if end - start > 0.0115 * duration * len(link):  # else the text would not fit
                 ax.text((start + end) / 2, row, link, ha="center", va="center", fontsize=7.5)
                 labelled.add(link)
-    if any(link not in labelled for link in order) and isinstance(ax.figure, Figure):
-        patches = [Patch(color=colours[link]) for link in order]
-        ax.figure.legend(patches, order, loc="outside lower center", ncols=4, **LEGEND)
+    if colours.keys() - labelled and isinstance(ax.figure, Figure):
+        patches = [Patch(color=colour, label=link) for link, colour in colours.items()]
+        ax.figure.legend(handles=patches, loc="outside lower center", ncols=4, **LEGEND)
     _label_bands(ax, logs, "control\npoint on")
 
 
@@ -181,13 +182,6 @@ def _label_bands(ax: Axes, logs: Sequence[TrialLog], name: str) -> None:
 def _end(log: TrialLog) -> float:
     """When the last tick's command ends [s]."""
     return float(log.time[-1] + (log.time[-1] - log.time[-2] if len(log.time) > 1 else 0.0))
-
-
-def _spans(log: TrialLog) -> Iterator[tuple[str, float, float]]:
-    """(link, start, end) of every stretch of time with the same link, those with none left out."""
-    for link, start, end in _stretches(log, np.asarray(log.control_link)):
-        if link:
-            yield str(link), start, end
 
 
 def _stretches(log: TrialLog, values: NDArray[Any]) -> Iterator[tuple[Any, float, float]]:

@@ -1,18 +1,20 @@
 """One trial, in whichever process: the robot loaded once, the run measured or recorded."""
 
-import hashlib
 import warnings
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from proxcgal.core.errors import ConfigError, ModelWarning
-from proxcgal.core.progress import OnProgress
+from proxcgal.core.progress import OnProgress, ProgressBar
 from proxcgal.evaluation.trial_log import TrialLog
 from proxcgal.models.robots import Robot
 from proxcgal.recording.writer import RecordedTicks, Recorder
 from proxcgal.scenario.scenario import Scenario
 from proxcgal.scenario.setup import make_robot
+from proxcgal.study.jobs import Job
+from proxcgal.study.workers import Pool
 from proxcgal.trial.trial import run_trial
 
 _KEPT = 4  # robots, with all that is made of them once
@@ -99,7 +101,33 @@ def robot_of(scenario: Scenario, digest: str | None = None) -> Robot:
     return robot
 
 
-def scene_digests(base: Scenario, robot: Robot) -> dict[str, str]:
-    """Digests of a scene and its robot, by name: part of the description of a campaign."""
-    scene = hashlib.sha256(base.to_toml().encode()).hexdigest()[:16]
-    return {f"scene {base.name}": scene, f"robot of {base.name}": robot.digest}
+def simulate_all(
+    pool: Pool,
+    jobs: Sequence[Job],
+    seconds: Sequence[float],
+    line: Callable[[int, TrialLog], str],
+    *,
+    quiet: bool,
+) -> list[TrialLog]:
+    """Runs recorded trials; warns of recordings that stopped early.
+
+    Args:
+        pool: does the work.
+        jobs: each returns its trial's log.
+        seconds: [s] simulated by each.
+        line: what a log file of the progress says of an ended trial, by its row.
+        quiet: no progress on stderr.
+    """
+    with ProgressBar("simulating", seconds, "s", quiet=quiet) as progress:
+        logs: list[TrialLog] = pool.run(
+            jobs, progress.shares, lambda row, log: progress.finished(line(row, log))
+        )
+    warn_of_stopped(logs)
+    return logs
+
+
+def warn_of_stopped(logs: Sequence[TrialLog]) -> None:
+    """Warns of recordings that stopped early; the workers' own warnings are suppressed."""
+    for log in logs:
+        if log.recording_failure:
+            warnings.warn(log.recording_failure, RuntimeWarning, stacklevel=3)

@@ -191,9 +191,8 @@ class _Run:
             try:
                 given_up |= self._collect(cluster.killed)
             except (CancelledError, ImportError) as error:  # gone, or a worker without us
-                reason = str(error) or "it is gone"
                 raise SimulationError(
-                    f"--cluster {cluster.address}: lost on the way: {reason}"
+                    f"--cluster {cluster.address}: lost on the way: {str(error) or 'it is gone'}"
                 ) from None
         return dict(sorted(given_up.items()))
 

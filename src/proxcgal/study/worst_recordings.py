@@ -45,7 +45,11 @@ def record_worst(
     jobs = [functools.partial(_record, e.trial, place / name, ticks) for name, e in todo.items()]
     sizes = [each.trial.scenario.duration for each in todo.values()]
     with ProgressBar("recording the worst", sizes, "s", quiet=quiet) as progress:
-        answers = pool.run(jobs, progress.shares, on_lost=_lost)
+        answers = pool.run(
+            jobs,
+            progress.shares,
+            on_lost=lambda _, deaths: f"its worker process died, {deaths} times (out of memory?)",
+        )
     errors: dict[str, str] = {}
     for (name, each), answer in zip(todo.items(), answers, strict=True):
         if isinstance(answer, str):
@@ -83,10 +87,6 @@ def _compare(ended: Ended, numbers: Mapping[str, Any]) -> None:
             f"{ended.trial.name} did not repeat itself: {', '.join(apart)} differ from the "
             "campaign's; was it run on another machine?", RuntimeWarning, stacklevel=3,
         )  # fmt: skip
-
-
-def _lost(_: int, deaths: int) -> str:
-    return f"its worker process died, {deaths} times (out of memory?)"
 
 
 def _record(

@@ -34,25 +34,21 @@ class AccessControl:
         self.bounds = bounds or ClientBounds()
         self._loopback_only = host in LOOPBACK
         self._lock = threading.Lock()
-        self._viewers = 0
+        self.viewers = 0  #: pages that are connected now
         self._controls: dict[str, Callable[[object], bool]] = {}
         self.refused = 0  #: connections
         self.dropped = 0  #: messages
 
-    @property
-    def viewers(self) -> int:
-        """Pages that are connected now."""
-        return self._viewers
-
-    def allow_control(self, control: Any, allowed: Callable[[object], bool]) -> None:
-        """Lets pages set the value of one of viser's controls, to what is allowed only."""
+    def allow_control(self, control: Any, allowed: Callable[[object], bool]) -> Any:
+        """Lets pages set the value of one of viser's controls, which it returns."""
         self._controls[control._impl.uuid] = allowed
+        return control
 
     def refusal(self, request: Request) -> Response | None:
         """The answer to a request that is refused; None where it may go on."""
         if any(len(request.headers.get_all(name)) > 1 for name in ("Host", "Origin", "Upgrade")):
             return self._refuse("a header came twice")
-        host, upgrade = request.headers.get("Host", ""), _upgrades(request)
+        host = request.headers.get("Host", "")
         # A page of another site, or a name that was made to point here, must not reach us.
         if self._loopback_only and _name(host) not in LOOPBACK:
             return self._refuse(
@@ -63,7 +59,8 @@ class AccessControl:
             return self._refuse("pages of other origins may not connect")
         if not self._has_token(request):
             return self._refuse("a token is needed: open the address that `proxcgal` printed")
-        if upgrade and self._viewers >= self.bounds.viewers:
+        upgrade = request.headers.get("Upgrade", "").lower() == "websocket"
+        if upgrade and self.viewers >= self.bounds.viewers:
             return self._refuse(
                 f"{self.bounds.viewers} pages look on already", http.HTTPStatus.SERVICE_UNAVAILABLE
             )
@@ -79,13 +76,13 @@ class AccessControl:
     def viewer(self) -> Iterator[bool]:
         """Counts a connected page; false where there are too many by now."""
         with self._lock:
-            self._viewers += 1
-            room = self._viewers <= self.bounds.viewers
+            self.viewers += 1
+            room = self.viewers <= self.bounds.viewers
         try:
             yield room
         finally:
             with self._lock:
-                self._viewers -= 1
+                self.viewers -= 1
 
     def accepts(self, raw: object) -> bool:
         """Whether a page may send this message."""
@@ -114,10 +111,6 @@ class AccessControl:
         headers = Headers({"Content-Type": "text/plain; charset=utf-8", "Connection": "close",
                            "Content-Length": str(len(body))})  # fmt: skip
         return Response(status.value, status.phrase, headers, body)
-
-
-def _upgrades(request: Request) -> bool:
-    return request.headers.get("Upgrade", "").lower() == "websocket"
 
 
 def _name(host: str) -> str:

@@ -58,8 +58,12 @@ class Choice:
             quiet = dict.fromkeys(
                 ("sigma_ratio", "sigma_floor", "bias", "dropout", "uncertain"), 0.0
             )
-            simulation = changed.simulation.model_copy(update=quiet)
-            changed = changed.model_copy(update={"controller": settings, "simulation": simulation})
+            changed = changed.model_copy(
+                update={
+                    "controller": settings,
+                    "simulation": changed.simulation.model_copy(update=quiet),
+                }
+            )
         return change_scenario(
             changed, "page",
             [
@@ -70,21 +74,24 @@ class Choice:
 
     def _check(self, scenario: Scenario) -> None:
         settings = scenario.controller
-        problems = []
-        for name, value, allowed in (
-            ("controller", self.controller, CONTROLLERS),
-            ("robot", self.robot, robots(scenario)),
-            ("vertices", self.vertices, resolutions(scenario)),
-        ):
-            if value not in allowed:
-                problems.append(f"{name} = {value!r}: there are {', '.join(map(str, allowed))}")
-        for name, number, (low, high, _), own in (
-            ("d_min", self.d_min, D_MIN, settings.d_min),
-            ("buffer", self.buffer, BUFFER, settings.buffer),
-            ("gain", self.gain, GAIN, settings.avoid_gain),
-        ):
-            if not min(low, own) <= number <= max(high, own):
-                problems.append(f"{name} = {number:g}: from {low:g} to {high:g}")
+        problems = [
+            f"{name} = {value!r}: there are {', '.join(map(str, allowed))}"
+            for name, value, allowed in (
+                ("controller", self.controller, CONTROLLERS),
+                ("robot", self.robot, robots(scenario)),
+                ("vertices", self.vertices, resolutions(scenario)),
+            )
+            if value not in allowed
+        ]
+        problems += [
+            f"{name} = {number:g}: from {low:g} to {high:g}"
+            for name, number, (low, high, _), own in (
+                ("d_min", self.d_min, D_MIN, settings.d_min),
+                ("buffer", self.buffer, BUFFER, settings.buffer),
+                ("gain", self.gain, GAIN, settings.avoid_gain),
+            )
+            if not min(low, own) <= number <= max(high, own)
+        ]
         if problems:
             raise ConfigError("\n".join(problems))
 

@@ -77,21 +77,18 @@ def _number(value: object, bounds: ClientBounds) -> bool:
 
 
 def _vector(length: int) -> Callable[[object, ClientBounds], bool]:
-    def check(value: object, bounds: ClientBounds) -> bool:
-        return (
-            isinstance(value, list)
-            and len(value) == length
-            and all(_number(each, bounds) and abs(each) <= bounds.farthest for each in value)
-        )
-
-    return check
+    return lambda value, bounds: (
+        isinstance(value, list) and len(value) == length
+        and all(_number(each, bounds) and abs(each) <= bounds.farthest for each in value)
+    )  # fmt: skip
 
 
 def _quaternion(value: object, bounds: ClientBounds) -> bool:
-    if not _vector(4)(value, bounds):
-        return False
-    assert isinstance(value, list)
-    return 0.9 < float(sum(each * each for each in value)) < 1.1
+    return (
+        isinstance(value, list)
+        and _vector(4)(value, bounds)
+        and 0.9 < float(sum(each * each for each in value)) < 1.1
+    )
 
 
 def _updates(value: object, bounds: ClientBounds) -> bool:

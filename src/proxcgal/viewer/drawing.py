@@ -81,7 +81,11 @@ class Drawing:
     def show(self, moment: Posed) -> None:
         """Moves everything to where it is at that moment."""
         self._place(self._links, moment.links_W)
-        self._pair(moment)
+        pair = moment.control_W, moment.obstacle_W
+        there = pair[0] is not None and pair[1] is not None
+        _shown(self._arrow, there)
+        if there:
+            self._arrow.points = np.array([pair], np.float32)
         if self._ghost:
             return
         self._place(self._solids, moment.solids_W)
@@ -112,11 +116,9 @@ class Drawing:
 
     def remove(self) -> None:
         """Takes every node away."""
-        for handle in (*self._links, *self._solids, self._arrow):
+        own = () if self._ghost else (self._kept, self._held, self._removed, self._goal)
+        for handle in (*self._links, *self._solids, self._arrow, *own):
             handle.remove()
-        if not self._ghost:
-            for handle in (self._kept, self._held, self._removed, self._goal):
-                handle.remove()
 
     def _link(self, row: int, link: str) -> Any:
         vertices_L, triangles = self.model.meshes[row]
@@ -130,11 +132,9 @@ class Drawing:
     def _sensors(self) -> list[tuple[list[int], Any, Any]]:
         """Below each link that carries some: their places, and the edges of their views."""
         made = []
-        corners = _FRUSTUM * np.tan(0.5 * self.model.field_of_view)
-        ends_S = np.array(
-            [[x, y, _FRUSTUM] for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))], float
-        )
-        ends_S[:, :2] *= corners
+        side = _FRUSTUM * np.tan(0.5 * self.model.field_of_view)
+        corners = ((-side, -side), (side, -side), (side, side), (-side, side))
+        ends_S = np.array([[x, y, _FRUSTUM] for x, y in corners])
         for link in sorted(set(self.model.sensor_links)):
             rows = [row for row, on in enumerate(self.model.sensor_links) if on == link]
             edges = []
@@ -169,13 +169,6 @@ class Drawing:
         if on and len(points_W):
             cloud.points = points_W.astype(np.float16)
 
-    def _pair(self, moment: Posed) -> None:
-        pair = moment.control_W, moment.obstacle_W
-        there = pair[0] is not None and pair[1] is not None
-        _shown(self._arrow, there)
-        if there:
-            self._arrow.points = np.array([pair], np.float32)
-
     def _place(self, handles: list[Any], poses_W: Array) -> None:
         for handle, pose in zip(handles, poses_W, strict=True):
             self._put(handle, pose)
@@ -208,25 +201,16 @@ def add_surroundings(server: viser.ViserServer, model: SceneModel) -> None:
         "/light/sun", color=(255, 255, 255), intensity=1.6, position=(1.5, -2.0, 4.0),
         cast_shadow=False,
     )  # fmt: skip
-    scene.add_grid(
-        "/floor", width=4.0, height=4.0, plane="xy", cell_size=0.25, section_size=1.0,
-        cell_color=(226, 229, 233), section_color=(190, 196, 204),
-        position=(0.0, 0.0, floor_height(model)),
-    )  # fmt: skip
-    set_initial_camera(server, model)
-
-
-def floor_height(model: SceneModel) -> float:
-    """Height of the lowest solid that stands below the arm's base; else of that base, 0 [m]."""
+    # At the height of the lowest solid that stands below the arm's base; else of that base, 0.
     lowest = (
         float(T_WO[2, 3] - np.abs(T_WO[2, :3]) @ solid.extent)
         for T_WO, solid in zip(model.solids_W, model.solids, strict=True)
     )
-    return min(0.0, *lowest, 0.0)
-
-
-def set_initial_camera(server: viser.ViserServer, model: SceneModel) -> None:
-    """Where a page begins to look from: beside the arm and its nearest solid."""
+    scene.add_grid(
+        "/floor", width=4.0, height=4.0, plane="xy", cell_size=0.25, section_size=1.0,
+        cell_color=(226, 229, 233), section_color=(190, 196, 204),
+        position=(0.0, 0.0, min(0.0, *lowest, 0.0)),
+    )  # fmt: skip
     position, target = initial_viewpoint(model)
     server.initial_camera.position = tuple(position)
     server.initial_camera.look_at = tuple(target)
@@ -235,7 +219,7 @@ def set_initial_camera(server: viser.ViserServer, model: SceneModel) -> None:
 
 
 def initial_viewpoint(model: SceneModel) -> tuple[Array, Array]:
-    """Camera position and what it looks at, (3,) each [m]."""
+    """Camera position and target, (3,) each [m]: from beside the arm and its nearest solid."""
     centers = [T_WO[:3, 3] for T_WO in model.solids_W]
     near = min(centers, key=lambda c: float(np.linalg.norm(c - model.tool_W)), default=model.tool_W)
     target = 0.4 * model.tool_W + 0.3 * near + np.array([0.0, 0.0, 0.1])

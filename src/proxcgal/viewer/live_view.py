@@ -5,7 +5,7 @@ import sys
 import threading
 
 from proxcgal.scenario.scenario import Scenario
-from proxcgal.study.runs.setup_check import check_setup
+from proxcgal.study.runs.preparation import check_setup
 from proxcgal.trial.walkthrough.setup import WalkSetup
 from proxcgal.viewer.live_page import LivePage
 from proxcgal.viewer.page_server import page_address, served_page

@@ -1,5 +1,6 @@
-"""Parts of every panel of the live page: buttons, lists, and the handle to drag with."""
+"""Parts of a page's panel: controls, each registered with its allowed values, and the handle."""
 
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import viser.transforms
 from proxcgal.sim.moment import Posed
 from proxcgal.trial.walkthrough.operator_hand import HAND
 from proxcgal.viewer.access import AccessControl
-from proxcgal.viewer.allowed_controls import AllowedControls
+from proxcgal.viewer.client_messages import between, one_of, switch
 from proxcgal.viewer.command_queue import ROOM, CommandQueue
 from proxcgal.viewer.drawing import initial_viewpoint, pose_parts
 from proxcgal.viewer.messages import Update
@@ -17,6 +18,58 @@ from proxcgal.viewer.scene_model import SceneModel
 
 HANDLE = "/handle"
 _HANDLE_SHARE = 0.1  # of the distance that a page begins to look from: large enough to be caught
+
+
+class AllowedControls:
+    """Adds controls to the panel at the right of a page."""
+
+    def __init__(self, server: viser.ViserServer, access: AccessControl) -> None:
+        """Docks the panel."""
+        self._server, self._access = server, access
+        server.gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
+        server.gui.main_panel.dock_right()
+
+    def add_button(self, label: str, work: Callable[[], None]) -> Any:
+        """A button that does some work."""
+        button = self._access.allow_control(self._server.gui.add_button(label), switch)
+
+        async def clicked(_: Any) -> None:
+            work()
+
+        button.on_click(clicked)
+        return button
+
+    def add_buttons(self, label: str, work: Mapping[str, Callable[[], None]]) -> None:
+        """A row of buttons, each with its work."""
+        group = self._server.gui.add_button_group(label, tuple(work))
+        self._access.allow_control(group, one_of(work))
+
+        async def clicked(event: Any) -> None:
+            work[event.target.value]()
+
+        group.on_click(clicked)
+
+    def add_list(self, label: str, options: Sequence[str], value: str) -> Any:
+        """A list to choose from."""
+        control = self._server.gui.add_dropdown(label, tuple(options), initial_value=value)
+        return self._access.allow_control(control, one_of(options))
+
+    def add_switch(self, label: str, value: bool, work: Callable[[bool], None] | None) -> Any:
+        """A check box, with the work that each change of it does."""
+        control = self._access.allow_control(self._server.gui.add_checkbox(label, value), switch)
+        if work is not None:
+
+            async def changed(event: Any) -> None:
+                work(bool(event.target.value))
+
+            control.on_update(changed)
+        return control
+
+    def add_slider(self, label: str, bounds: tuple[float, float, float], value: float) -> Any:
+        """A slider; its least, most and step, which its value may widen."""
+        low, high, step = min(bounds[0], value), max(bounds[1], value), bounds[2]
+        control = self._server.gui.add_slider(label, low, high, step, value)
+        return self._access.allow_control(control, between(low, high))
 
 
 class Panel(AllowedControls):
@@ -82,8 +135,9 @@ class Panel(AllowedControls):
         self._of_model.append(self._handle(model))
         folder = self._server.gui.add_folder(title)
         with folder:
-            names = list(dict.fromkeys(model.draggable))
-            self._which = self.add_list("drag", names, first_draggable(model))
+            self._which = self.add_list(
+                "drag", list(dict.fromkeys(model.draggable)), first_draggable(model)
+            )
             self._which.on_update(self._other_chosen)
             self.add_button("let go", self._release)
         self._of_model.append(folder)

@@ -68,8 +68,7 @@ def replay_moments(
     for row, (then, now, q) in enumerate(both):
         same += now.result.same(then.result)
         if row % step == 0 or row == last:
-            clouds = Clouds.of(again.ctrl)
-            moments.append(_moment(again.setup, clouds, now, q, float(times[row])))
+            moments.append(_moment(again.setup, Clouds.of(again.ctrl), now, q, float(times[row])))
     if ahead:
         moments = [_ahead(again.setup, moment) for moment in moments]
     return ReplayedRun(SceneModel.of(again.setup), again.controller, tuple(moments), same, count)

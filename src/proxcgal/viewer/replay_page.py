@@ -14,9 +14,9 @@ from proxcgal.core import modes
 from proxcgal.recording.reader import Recording
 from proxcgal.sim.moment import Moment, metres
 from proxcgal.viewer.access import AccessControl
-from proxcgal.viewer.allowed_controls import AllowedControls
 from proxcgal.viewer.drawing import Drawing, add_surroundings
 from proxcgal.viewer.page_server import checked_token, page_address, served_page
+from proxcgal.viewer.panel import AllowedControls
 from proxcgal.viewer.plots import plot_whole_run
 from proxcgal.viewer.replay_moments import AHEAD, ReplayedRun, replay_moments
 
@@ -49,7 +49,7 @@ class ReplayPage:
         self._server = server
         self._lock = threading.Lock()
         self._playing = False
-        self._row = -1
+        self.row = -1  #: of the moment that is shown
         self._closing = threading.Event()
         add_surroundings(server, recorded.model)
         self._drawings = [Drawing(server.scene, recorded.model)]
@@ -77,18 +77,13 @@ class ReplayPage:
         self._thread = threading.Thread(target=self._play, daemon=True)
         self._thread.start()
 
-    @property
-    def row(self) -> int:
-        """Of the moment that is shown."""
-        return self._row
-
     def show(self, row: int) -> None:
         """Shows the moment of that row."""
         row = min(max(row, 0), len(self._times) - 1)
         with self._lock, self._server.atomic():
-            if row == self._row:
+            if row == self.row:
                 return
-            self._row = row
+            self.row = row
             moment = self._recorded.moments[row]
             self._drawings[0].show(moment)
             other = None if self._again is None else self._again.moments[row]
@@ -105,12 +100,12 @@ class ReplayPage:
         last = len(self._times) - 1
         if button == "play":
             self._playing = True
-            if self._row >= last:
+            if self.row >= last:
                 self._go(0)
         else:
             self._playing = False
             if button != "pause":
-                self._go(self._row + (1 if button == "next" else -1))
+                self._go(self.row + (1 if button == "next" else -1))
 
     def _go(self, row: int) -> None:
         row = min(max(row, 0), len(self._times) - 1)
@@ -124,9 +119,9 @@ class ReplayPage:
             if self._playing:
                 numerator, _, denominator = self._speed.value.partition("/")
                 speed = int(numerator) / int(denominator or 1)
-                time = self._times[self._row] + max(speed * (now - at), 1e-6)
+                time = self._times[self.row] + max(speed * (now - at), 1e-6)
                 row = int(np.searchsorted(self._times, time))
-                if row > self._row:
+                if row > self.row:
                     at = now
                     self._go(row)
                 if row >= len(self._times) - 1:

@@ -115,9 +115,10 @@ class _Simulation:
         if request.restart or (request.reset and not stopped):
             self._restart()
         elif request.reset or (request.choice is not None and stopped):
-            self._send_note(
-                f"{self._stop_reason}: only Enter where `proxcgal view` runs leads out of it"
-            )
+            reason = "the controller has stopped"
+            if isinstance(self._trial, WalkTrial):
+                reason = "a stop took longer than the guard declares"
+            self._send_note(f"{reason}: only Enter where `proxcgal view` runs leads out of it")
         if request.choice is not None and not stopped and request.choice != self._choice:
             self._choose(request.choice)
         if request.running is not None:
@@ -133,12 +134,6 @@ class _Simulation:
         if request.enable and isinstance(self._trial, WalkTrial):
             self._trial.enable()
         return 0 if self._running else min(request.steps, 100)
-
-    @property
-    def _stop_reason(self) -> str:
-        if isinstance(self._trial, WalkTrial):
-            return "a stop took longer than the guard declares"
-        return "the controller has stopped"
 
     def _restart(self) -> None:
         """The arm at its start, the time at 0."""

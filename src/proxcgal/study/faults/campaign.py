@@ -16,9 +16,14 @@ from proxcgal.scenario.loading import load_scenario
 from proxcgal.scenario.scenario import Scenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.sim.assembly import Assembly
-from proxcgal.study.campaign import Campaign, Trial
-from proxcgal.study.campaign_kind import CampaignKind, CampaignRequest
-from proxcgal.study.campaign_plan import CampaignPlan
+from proxcgal.study.campaign import (
+    Campaign,
+    CampaignKind,
+    CampaignPlan,
+    CampaignRequest,
+    Trial,
+    ranked,
+)
 from proxcgal.study.campaign_store import Row as Numbers
 from proxcgal.study.faults.cases import ROW_OF, ROWS, TICK_MS, Fault, Row
 from proxcgal.study.faults.figures import figures
@@ -203,21 +208,12 @@ def analyse(table: pl.DataFrame, campaign: Campaign) -> Summary:
     }
 
 
-def worst(table: pl.DataFrame) -> list[str]:
-    """Those that were wrong, then the slowest."""
-    done = table.filter(pl.col("error").is_null())
-    order = done.sort(
-        "right", "latency_ms", "key", descending=[False, True, False], nulls_last=True
-    )
-    return order["key"].to_list()
-
-
 KIND = CampaignKind(
     title="Faults",
     introduction="A fault between the world and the controller while the arm moves: what mode "
     "follows, how soon, and whether the arm recovers. Engineering figures from a simulation, not a "
     "certificate.",
     plan=plan, analyse=analyse, listings=listings, verdicts=verdicts, figures=figures,
-    captions=captions, worst=worst, pages=pages,
+    captions=captions, worst=ranked(right=False, latency_ms=True), pages=pages,
     worst_of="all runs: the wrong ones, then the slowest",
 )  # fmt: skip

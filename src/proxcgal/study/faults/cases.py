@@ -28,34 +28,25 @@ class Row:
     refused: bool = False  # the run must not begin, for that very sensor
 
 
+def _fault(kind: str, sensor: int | str, value: float | None = None) -> Fault:
+    return {"kind": kind, "sensor": sensor} | ({} if value is None else {"value": value})
+
+
 def one(kind: str, value: float | None = None) -> Callable[[int], Sequence[Fault]]:
     """A fault of one sensor."""
-
-    def faults(sensor: int) -> Sequence[Fault]:
-        fault: Fault = {"kind": kind, "sensor": sensor}
-        return [fault if value is None else fault | {"value": value}]
-
-    return faults
+    return lambda sensor: [_fault(kind, sensor, value)]
 
 
 def array(kind: str) -> Callable[[int], Sequence[Fault]]:
     """The same fault of every sensor of the array that the sensor belongs to."""
-
-    def faults(sensor: int) -> Sequence[Fault]:
-        first = sensor - sensor % SENSORS
-        return [{"kind": kind, "sensor": row} for row in range(first, first + SENSORS)]
-
-    return faults
+    return lambda sensor: [
+        _fault(kind, sensor - sensor % SENSORS + place) for place in range(SENSORS)
+    ]
 
 
 def every(kind: str, value: float | None = None) -> Callable[[int], Sequence[Fault]]:
     """The fault of all sensors, or of an input that has none."""
-
-    def faults(_: int) -> Sequence[Fault]:
-        fault: Fault = {"kind": kind, "sensor": "all"}
-        return [fault if value is None else fault | {"value": value}]
-
-    return faults
+    return lambda _: [_fault(kind, "all", value)]
 
 
 #: A silent sensor degrades; where the arm moves into what it covered, it holds.

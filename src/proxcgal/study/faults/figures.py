@@ -40,11 +40,10 @@ def figures(table: pl.DataFrame, _: Summary | None = None) -> dict[str, Figure]:
             ax.plot(
                 [1000 * row.within] * 2, [height - 0.4, height + 0.4], color=GREY, lw=1.2, zorder=1
             )
-        ax.set_title(robot)
-        ax.set_xlabel("time to the required mode [ms]")
         ax.set_yticks(range(len(rows)), [row.name for row in reversed(rows)], fontsize=9)
         ax.spines[["top", "right"]].set_visible(False)
-        ax.set_xlim(left=-5.0)  # a bound of 0 is seen
+        # From below 0, so that a bound of 0 is seen.
+        ax.set(title=robot, xlabel="time to the required mode [ms]", xlim=(-5.0, None))
     handles = [Line2D([], [], color=colour, marker=".", linestyle="", label=NAMES[mode])
                for mode, colour in COLOURS.items()]  # fmt: skip
     handles.append(Line2D([], [], color=GREY, linewidth=2, label="bound"))

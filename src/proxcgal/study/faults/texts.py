@@ -4,9 +4,9 @@ from collections.abc import Iterator
 
 from proxcgal.core import modes
 from proxcgal.evaluation.metrics import Summary
+from proxcgal.study.campaign import Listing
 from proxcgal.study.faults.cases import ROW_OF, ROWS, TICK_MS, Row
 from proxcgal.study.faults.reliability_page import reliability_page, whole_ms
-from proxcgal.study.listing import Listing
 
 
 def listings(summary: Summary) -> list[Listing]:

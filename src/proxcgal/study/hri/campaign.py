@@ -12,9 +12,15 @@ from proxcgal.evaluation.phases import SAMPLES_HZ
 from proxcgal.scenario.hri_scenario import HriScenario
 from proxcgal.scenario.loading import load_scenario
 from proxcgal.scenario.scenario import CONTROLLERS
-from proxcgal.study.campaign import Campaign, Trial, file_name
-from proxcgal.study.campaign_kind import CampaignKind, CampaignRequest
-from proxcgal.study.campaign_plan import CampaignPlan
+from proxcgal.study.campaign import (
+    Campaign,
+    CampaignKind,
+    CampaignPlan,
+    CampaignRequest,
+    Trial,
+    file_name,
+    ranked,
+)
 from proxcgal.study.campaign_store import Row
 from proxcgal.study.hri.figures import figures
 from proxcgal.study.hri.layouts import draw_layout
@@ -130,15 +136,6 @@ def perform(trial: Trial, report: OnProgress) -> Row:
     return trial_metrics(log, trial.scenario)
 
 
-def worst(table: pl.DataFrame) -> list[str]:
-    """The whole-body trials of the cell as it is that came nearest to the human."""
-    ours = table.filter(
-        pl.col("controller") == "wb", pl.col("layout") == "main", pl.col("error").is_null()
-    )
-    order = ours.sort("true_min_m", "too_close_ticks", "key", descending=[False, True, False])
-    return order["key"].to_list()
-
-
 def side_by_side(campaign: Campaign) -> list[Trial]:
     """The first subject at the last task, as in `trials.png`, whole body and sensor points."""
     last = campaign.trials[-1].tags["task"]
@@ -154,7 +151,12 @@ KIND = CampaignKind(
     title="A human in the workspace",
     introduction=introduction,
     plan=plan, analyse=analyse, listings=listings, verdicts=verdicts, figures=figures,
-    captions=captions, worst=worst,
+    captions=captions,
+    # Those first that came nearest to the human, or were too near for longer.
+    worst=ranked(
+        pl.col("controller") == "wb", pl.col("layout") == "main",
+        true_min_m=False, too_close_ticks=True,
+    ),
     worst_of="wb's trials in the cell as it is, by the least true distance", runs=20,
     side_by_side=side_by_side,
 )  # fmt: skip

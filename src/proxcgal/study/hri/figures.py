@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from proxcgal.evaluation.metrics import Summary
-from proxcgal.study.bootstrap import mean_interval
+from proxcgal.study.bootstrap import mean_interval, pairs
 from proxcgal.study.hri.metrics import (
     SAMPLE_S,
     compared,
@@ -18,7 +18,6 @@ from proxcgal.study.hri.metrics import (
     series,
     subject_means,
 )
-from proxcgal.study.paired import pairs
 from proxcgal.study.plotting import (
     CONTROLLER_COLOURS,
     CONTROLLER_NAMES,
@@ -165,8 +164,9 @@ def _subjects(main: pl.DataFrame, paper: Paper) -> Figure:
         )
         for name in names
     ]  # fmt: skip
-    plain: dict[str, Any] = {"linestyle": "", "fillstyle": "none"}
-    handles.append(Line2D([], [], color=GREY, marker="D", label="ours, seen", **plain))
+    handles.append(
+        Line2D([], [], color=GREY, marker="D", linestyle="", fillstyle="none", label="ours, seen")
+    )
     if any(name in paper.get(row, {}) for row in rows for name in names):
         handles.append(_printed_handle("black"))
     legend_below(figure, handles)

@@ -67,18 +67,21 @@ def draw_layout(
 
 
 def _moved(base: HriScenario, draw: np.random.Generator) -> list[str]:
-    operator = base.operator
-    goal = base.goal
     assignments = []
-    if goal.waypoints is not None:
-        points = [_shifted(point, draw) for point in goal.waypoints]
+    if base.goal.waypoints is not None:
+        points = [_shifted(point, draw) for point in base.goal.waypoints]
         assignments.append(f"goal.waypoints=[{', '.join(points)}]")
-    for table, places in (("marks", operator.marks), ("places", operator.places)):
-        for key in sorted(places):
-            assignments.append(f"operator.{table}.{key}={_shifted(places[key], draw)}")
-    for row, obstacle in enumerate(base.obstacles):
-        if obstacle.sensed:
-            assignments.append(f"obstacle.{row}.position={_shifted(obstacle.position, draw)}")
+    tables = {"marks": base.operator.marks, "places": base.operator.places}
+    assignments += [
+        f"operator.{table}.{key}={_shifted(places[key], draw)}"
+        for table, places in tables.items()
+        for key in sorted(places)
+    ]
+    assignments += [
+        f"obstacle.{row}.position={_shifted(obstacle.position, draw)}"
+        for row, obstacle in enumerate(base.obstacles)
+        if obstacle.sensed
+    ]
     return assignments
 
 

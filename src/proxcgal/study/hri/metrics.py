@@ -9,9 +9,8 @@ import polars as pl
 from proxcgal.core.typing import Array
 from proxcgal.evaluation.metrics import SELF_LIMIT_M, Summary
 from proxcgal.evaluation.phases import SAMPLES_HZ
-from proxcgal.study.bootstrap import mean_interval
+from proxcgal.study.bootstrap import Distances, by_controller, mean_interval, pairs
 from proxcgal.study.campaign import Campaign
-from proxcgal.study.paired import Distances, by_controller, pairs
 
 #: [WA] Tables I and II: mean and sigma_max [m] by row and controller.
 PAPER_MEANS = {
@@ -61,47 +60,45 @@ def analyse(table: pl.DataFrame, campaign: Campaign) -> Summary:
 
 def _layout(table: pl.DataFrame) -> Summary:
     """Both tables, differences and close calls of one layout of the cell."""
-    tasks = table["task"].unique(maintain_order=True).to_list()
-    by_task = {task: table.filter(pl.col("task") == task) for task in tasks}
+    by_task = {
+        task: table.filter(pl.col("task") == task)
+        for task in table["task"].unique(maintain_order=True)
+    }
     phases = {
         (task, phase): window
         for task, own in by_task.items()
         for phase, window in json.loads(own["windows"][0]).items()
     }
-    first = {task: _cell(own, task) for task, own in by_task.items()}
-    second = {
-        phase: _cell(by_task[task], phase, window) for (task, phase), window in phases.items()
-    }
-    paired = {row: _paired(subject_means(table, row)) for row in phase_rows(table)}
-    least = {
-        task: _paired(by_controller(own, "true_min_m", "subject")) for task, own in by_task.items()
-    }
-    close = {
-        str(name): int(part["too_close_ticks"].sum())
+    calls = {
+        str(name): {
+            "trials": len(part),
+            "too_close_trials": int((part["too_close_ticks"] > 0).sum()),
+            "too_close_ticks": int(part["too_close_ticks"].sum()),
+            "blind_ticks": int(part["blind_ticks"].sum()),
+            "blind_trials": int((part["blind_ticks"] > 0).sum()),
+            "true_min_m": part["true_min_m"].min(),
+            "empty_ticks": int(part["empty_ticks"].sum()),
+            "ticks": int(part["ticks"].sum()),
+            "held_ticks": int(part["held_ticks"].sum()),
+            "leaked_points_max": part["leaked_points_max"].max(),
+        }
         for (name,), part in table.group_by(["controller"], maintain_order=True)
     }
-    ours = table.filter(pl.col("controller").is_in(["wb", "sm"]))
     return {
-        "table1": first,
-        "table2": second,
-        "paired_mm": paired,
-        "paired_least_mm": least,
-        "too_close": {**close, "of_which_blind": int(ours["blind_ticks"].sum())},
-        "close_calls": {
-            str(name): {
-                "trials": len(part),
-                "too_close_trials": int((part["too_close_ticks"] > 0).sum()),
-                "too_close_ticks": int(part["too_close_ticks"].sum()),
-                "blind_ticks": int(part["blind_ticks"].sum()),
-                "blind_trials": int((part["blind_ticks"] > 0).sum()),
-                "true_min_m": part["true_min_m"].min(),
-                "empty_ticks": int(part["empty_ticks"].sum()),
-                "ticks": int(part["ticks"].sum()),
-                "held_ticks": int(part["held_ticks"].sum()),
-                "leaked_points_max": part["leaked_points_max"].max(),
-            }
-            for (name,), part in table.group_by(["controller"], maintain_order=True)
+        "table1": {task: _cell(own, task) for task, own in by_task.items()},
+        "table2": {
+            phase: _cell(by_task[task], phase, window) for (task, phase), window in phases.items()
         },
+        "paired_mm": {row: _paired(subject_means(table, row)) for row in phase_rows(table)},
+        "paired_least_mm": {
+            task: _paired(by_controller(own, "true_min_m", "subject"))
+            for task, own in by_task.items()
+        },
+        "too_close": {
+            **{name: own["too_close_ticks"] for name, own in calls.items()},
+            "of_which_blind": sum(calls[n]["blind_ticks"] for n in ("wb", "sm") if n in calls),
+        },
+        "close_calls": calls,
     }
 
 

@@ -5,8 +5,8 @@ from typing import Any
 
 from proxcgal.core.tables import in_metres
 from proxcgal.evaluation.metrics import Summary
+from proxcgal.study.campaign import Listing
 from proxcgal.study.hri.metrics import compared
-from proxcgal.study.listing import Listing
 
 _LAYOUTS = {"main": "the cell as it is", "jittered": "all positions moved by up to 0.1 m"}
 ROW_NAMES = {

@@ -35,7 +35,6 @@ def trial_metrics(log: TrialLog, scenario: HriScenario) -> Row:
     samples = sampled_ticks(log.elapsed, SAMPLES_HZ)
     close = log.true_m < TOO_CLOSE
     seen = np.isfinite(log.seen_m)
-    nearest = int(np.nanargmin(log.true_m))
     means = mean_distances(log, scenario)
     mean, seen_mean = means.pop("cycle")
     finite = bool(np.isfinite(log.qd).all() and np.isfinite(log.q).all())
@@ -46,7 +45,7 @@ def trial_metrics(log: TrialLog, scenario: HriScenario) -> Row:
         "empty_ticks": int((~seen).sum()),
         "ticks": len(log.elapsed),
         "true_min_m": summary["true_min_m"],
-        "true_min_link": log.true_link[nearest],
+        "true_min_link": log.true_link[int(np.nanargmin(log.true_m))],
         "too_close_ticks": int(close.sum()),
         "blind_ticks": int((close & (log.seen_m - log.true_m > UNSEEN_M)).sum()),
         "self_min_m": summary["self_min_m"],

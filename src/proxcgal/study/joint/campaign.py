@@ -8,9 +8,14 @@ from proxcgal.evaluation.metrics import SELF_LIMIT_M, Summary
 from proxcgal.models.macro_micro import part
 from proxcgal.scenario.joint_scenario import JointScenario
 from proxcgal.scenario.loading import load_scenario
-from proxcgal.study.campaign import Campaign, Trial
-from proxcgal.study.campaign_kind import CampaignKind, CampaignRequest
-from proxcgal.study.campaign_plan import CampaignPlan
+from proxcgal.study.campaign import (
+    Campaign,
+    CampaignKind,
+    CampaignPlan,
+    CampaignRequest,
+    Trial,
+    ranked,
+)
 from proxcgal.study.campaign_store import Row
 from proxcgal.study.joint.figures import figures
 from proxcgal.study.joint.metrics import COLUMNS, joint_metrics
@@ -103,12 +108,6 @@ def analyse(table: pl.DataFrame, campaign: Campaign) -> Summary:
     }
 
 
-def worst(table: pl.DataFrame) -> list[str]:
-    """Runs with avoidance that came nearest to an obstacle, the nearest first."""
-    ours = table.filter(pl.col("stack") != "no_avoidance", pl.col("error").is_null())
-    return ours.sort("true_min_m", "key")["key"].to_list()
-
-
 KIND = CampaignKind(
     title="The 12-joint robot: what each task costs and buys",
     introduction="A UR10e on the flange of a KUKA KR 150-2, one chain of 12 joints, goals by task "
@@ -118,6 +117,8 @@ KIND = CampaignKind(
     "thesis's author, not from its text; the car body's shell is ours. The robot has no inertias: "
     "every run is kinematic. Engineering figures from a simulation, not a certificate of any kind.",
     plan=plan, analyse=analyse, listings=listings, verdicts=verdicts, figures=figures,
-    captions=captions, worst=worst,
+    captions=captions,
+    # Those first that came nearest to an obstacle.
+    worst=ranked(pl.col("stack") != "no_avoidance", true_min_m=False),
     worst_of="the runs with avoidance, by the least true distance", runs=5,
 )  # fmt: skip

@@ -8,8 +8,7 @@ from proxcgal.core.files import NOTHING_M
 from proxcgal.core.tables import in_metres
 from proxcgal.evaluation.metrics import SELF_LIMIT_M, Summary
 from proxcgal.evaluation.trial_log import TOO_CLOSE
-from proxcgal.study.campaign import file_name
-from proxcgal.study.listing import Listing
+from proxcgal.study.campaign import Listing, file_name
 
 Run = dict[str, Any]
 

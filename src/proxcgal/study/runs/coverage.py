@@ -13,8 +13,7 @@ from proxcgal.scenario.scenario import Scenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.study.coverage_figure import coverage_figure
 from proxcgal.study.plotting import png
-from proxcgal.study.runs.result_folders import ready_folders
-from proxcgal.study.runs.setup_check import check_setup
+from proxcgal.study.runs.preparation import check_setup, ready_folders
 from proxcgal.trial.trial import run_trial
 
 STEP_S = 0.2  # [s] between the postures of a path that are looked from

@@ -18,10 +18,8 @@ from proxcgal.study.joint.figures import joint_figure
 from proxcgal.study.joint.metrics import joint_metrics
 from proxcgal.study.joint.texts import listings, verdicts
 from proxcgal.study.plotting import png
-from proxcgal.study.runs.result_folders import ready_folders
-from proxcgal.study.runs.setup_check import check_setup
-from proxcgal.study.runs.simulation import simulate_all
-from proxcgal.study.trial_simulation import robot_of, simulate_trial
+from proxcgal.study.runs.preparation import check_setup, ready_folders
+from proxcgal.study.trial_simulation import robot_of, simulate_all, simulate_trial
 from proxcgal.study.workers import Pool, default_workers
 
 FIGURE = "joint.png"

@@ -1,4 +1,4 @@
-"""Runs of scenes with one arm: each controller once, numbers and pictures in a folder a scene."""
+"""Runs of scenes: each controller once, numbers and pictures in a folder a scene."""
 
 import functools
 import sys
@@ -23,14 +23,15 @@ from proxcgal.evaluation.metrics import (
 from proxcgal.evaluation.phases import mean_distances
 from proxcgal.evaluation.trial_log import TrialLog
 from proxcgal.scenario.hri_scenario import HriScenario
+from proxcgal.scenario.joint_scenario import JointScenario
 from proxcgal.scenario.scenario import Scenario
-from proxcgal.scenario.walkthrough_scenario import GuidedScenario
+from proxcgal.scenario.walkthrough_scenario import GuidedScenario, WalkScenario
 from proxcgal.study.jobs import Job
+from proxcgal.study.runs.joint import run_joint
 from proxcgal.study.runs.pictures import draw_figures, draw_motion
-from proxcgal.study.runs.result_folders import ready_folders, remove_empty
-from proxcgal.study.runs.setup_check import check_setup
-from proxcgal.study.runs.simulation import simulate_all
-from proxcgal.study.trial_simulation import simulate_trial
+from proxcgal.study.runs.preparation import check_setup, ready_folders, remove_empty
+from proxcgal.study.runs.walkthrough import run_walkthrough
+from proxcgal.study.trial_simulation import simulate_all, simulate_trial
 from proxcgal.study.workers import Pool, default_workers
 from proxcgal.trial.walkthrough.guided_source import off_paths
 
@@ -191,3 +192,41 @@ def _draw(
         jobs.append(functools.partial(draw_figures, plan.scenario, list(logs), plan.folder))
     with ProgressBar("drawing", [1.0] * len(jobs), "", quiet=quiet) as progress:
         pool.run(jobs, progress.shares, lambda _, text: progress.finished(text))
+
+
+def run_scenario(
+    scenario: Scenario,
+    controllers: Sequence[str],
+    folder: Path,
+    command: str,
+    *,
+    workers: int | None = None,
+    pictures: bool = True,
+    quiet: bool = False,
+) -> bool:
+    """Runs it, fills the folder, the report apart, and prints the results.
+
+    Args:
+        scenario: what to run.
+        controllers: instead of the scenario's own, where any are named; a walk-through has none.
+        folder: of the results.
+        command: as typed; for `run.json`.
+        workers: processes; None takes one a processor.
+        pictures: draw the moving picture too.
+        quiet: no progress on stderr.
+
+    Returns:
+        True where the run has failed: the robot came too near to itself.
+
+    Raises:
+        ProxError: what does not fit, a run that cannot go on.
+        KeyboardInterrupt: with a message of what was kept.
+    """
+    if isinstance(scenario, WalkScenario):
+        run_walkthrough(scenario, folder, command, quiet=quiet)
+        return False
+    names = tuple(dict.fromkeys(controllers or scenario.controllers()))
+    if isinstance(scenario, JointScenario):
+        return run_joint(scenario, names, folder, command, workers=workers, quiet=quiet)
+    plan = ScenePlan(scenario=scenario, controllers=names, folder=folder)
+    return run_scenes([plan], command, workers=workers, pictures=pictures, quiet=quiet)

@@ -1,17 +1,18 @@
 """Run of a walk-through: teach, record, play back, draw, and say what was found."""
 
+import csv
 from pathlib import Path
 from typing import Any
 
+from proxcgal.core.errors import ConfigError
 from proxcgal.core.files import write_bytes, write_json, write_text
 from proxcgal.core.progress import ProgressBar, announce
 from proxcgal.core.provenance import origin
 from proxcgal.core.tables import aligned
 from proxcgal.scenario.walkthrough_scenario import WalkScenario
 from proxcgal.study.plotting import png
-from proxcgal.study.runs.result_folders import ready_folders, remove_empty
+from proxcgal.study.runs.preparation import ready_folders, remove_empty
 from proxcgal.study.walkthrough.figures import ratings_figure, teach_figure, trip_figure
-from proxcgal.study.walkthrough.ratings import read_ratings
 from proxcgal.trial.walkthrough.run import WalkResult, run_walk
 from proxcgal.trial.walkthrough.setup import WalkSetup
 from proxcgal.trial.walkthrough.taught_path import to_csv, to_trajectory
@@ -19,6 +20,7 @@ from proxcgal.trial.walkthrough.teaching import REACHED, check_duration
 
 RECORDING, FIGURE, TABLE, TRAJECTORY = "taught.mcap", "walkthrough.png", "path.csv", "path.json"
 RATINGS = "ratings.png"
+LEAST, MOST = 0.0, 10.0  # of a rating
 
 
 def run_walkthrough(scenario: WalkScenario, folder: Path, command: str, *, quiet: bool) -> None:
@@ -88,11 +90,10 @@ def _write(
 
 def walkthrough_lines(summary: dict[str, Any]) -> list[str]:
     """What a run found, for a terminal and for a page."""
-    found = []
-    for trip in summary["trips"]:
-        found.append(
-            f"{_cut(trip)}, {summary['latency_cycles']} cycles after the first true violation"
-        )
+    found = [
+        f"{_cut(trip)}, {summary['latency_cycles']} cycles after the first true violation"
+        for trip in summary["trips"]
+    ]
     if summary["trips"]:
         stop = summary["stop_time_s"]
         found.append(
@@ -151,3 +152,48 @@ def _unfinished(how: str, taught: dict[str, Any]) -> list[str]:
     if left is None or left <= REACHED:
         return []
     return [f"{how} the hand let go {left:.3f} m from the path's end: times do not compare"]
+
+
+def read_ratings(path: Path) -> dict[str, list[float]]:
+    """Ratings by indicator, in the file's order: a column an indicator, a row a tester.
+
+    Args:
+        path: of a CSV file whose first row names the indicators; ratings are 0 to 10, as in [WT]
+            4.1. An empty cell is no rating. It may begin with a byte order mark, as spreadsheets
+            write it.
+
+    Raises:
+        ConfigError: a file that cannot be read, and all cells that are no rating, one line each.
+    """
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            head, *rows = list(csv.reader(file)) or [[]]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise ConfigError(f"ratings {path}: cannot be read: {error}") from None
+    names = [name.strip() for name in head]
+    if not any(names) or not rows or len(set(names)) < len(names):
+        raise ConfigError(
+            f"ratings {path}: a first row of different indicators and a row for each tester are "
+            "needed"
+        )
+    found: dict[str, list[float]] = {name: [] for name in names}
+    problems = []
+    for number, row in enumerate(rows, start=2):
+        if len(row) > len(names):
+            problems.append(f"ratings {path}: line {number}: {len(row)} cells, {len(names)} named")
+        for name, cell in zip(names, row, strict=False):
+            if not cell.strip():
+                continue
+            try:
+                value = float(cell)
+            except ValueError:
+                value = float("nan")
+            if LEAST <= value <= MOST:
+                found[name].append(value)
+            else:
+                problems.append(
+                    f"ratings {path}: line {number}, {name} = {cell!r}: a number from 0 to 10"
+                )
+    if problems:
+        raise ConfigError("\n".join(problems))
+    return {name: values for name, values in found.items() if values}

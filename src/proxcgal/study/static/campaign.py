@@ -13,12 +13,16 @@ from proxcgal.core.progress import OnProgress
 from proxcgal.evaluation.metrics import CONTROLLER_KEYS, COVERAGE_KEYS, SELF_LIMIT_M, Summary
 from proxcgal.scenario.loading import load_scenario
 from proxcgal.scenario.scenario import CONTROLLERS, Scenario
-from proxcgal.study.bootstrap import median_interval
-from proxcgal.study.campaign import Campaign, Trial
-from proxcgal.study.campaign_kind import CampaignKind, CampaignRequest
-from proxcgal.study.campaign_plan import CampaignPlan
+from proxcgal.study.bootstrap import draw_distances, median_interval, pairs
+from proxcgal.study.campaign import (
+    Campaign,
+    CampaignKind,
+    CampaignPlan,
+    CampaignRequest,
+    Trial,
+    ranked,
+)
 from proxcgal.study.campaign_store import Row
-from proxcgal.study.paired import draw_distances, pairs
 from proxcgal.study.static.draws import draw_scene
 from proxcgal.study.static.figures import figures
 from proxcgal.study.static.memory_share import memory_summary
@@ -82,18 +86,23 @@ def perform(trial: Trial, report: OnProgress) -> Row:
     row: Row = {key: numbers[key] for key in CONTROLLER_KEYS}
     row |= {key: finite(share) for key, share in log.coverage.numbers().items()}
     for name, tick in (("true_min", log.nearest_tick), ("true_final", len(log.time) - 1)):
-        row[f"{name}_s"] = float(log.elapsed[tick])
-        row[f"{name}_link"] = log.true_link[tick]
-        row[f"seen_at_{name}_m"] = min(float(log.seen_m[tick]), NOTHING_M)
-        row[f"believed_at_{name}_link"] = log.control_link[tick]
+        row |= {
+            f"{name}_s": float(log.elapsed[tick]),
+            f"{name}_link": log.true_link[tick],
+            f"seen_at_{name}_m": min(float(log.seen_m[tick]), NOTHING_M),
+            f"believed_at_{name}_link": log.control_link[tick],
+        }
     kinds = log.sightings or (None, None)
     for name, sighting in zip(("true_min", "true_final"), kinds, strict=True):
         known = sighting is not None and np.isfinite(sighting.age_s)
         row[f"sighting_at_{name}"] = sighting.kind if sighting else None
         row[f"sighting_age_at_{name}_s"] = sighting.age_s if sighting and known else None
-    row["leaked_points_max"] = numbers["leaked_points_max"]
-    row["held_ticks"] = int((log.mode >= HOLD).sum())
-    return row | _drawn(trial.scenario)
+    return {
+        **row,
+        "leaked_points_max": numbers["leaked_points_max"],
+        "held_ticks": int((log.mode >= HOLD).sum()),
+        **_drawn(trial.scenario),
+    }
 
 
 def _drawn(scenario: Scenario) -> Row:
@@ -112,8 +121,10 @@ def _drawn(scenario: Scenario) -> Row:
 
 
 def _columns(trial: Trial) -> tuple[str, ...]:
-    own = (*MOMENT_KEYS, "leaked_points_max", "held_ticks")
-    return (*CONTROLLER_KEYS, *COVERAGE_KEYS, *own, *_drawn(trial.scenario))
+    return (
+        *CONTROLLER_KEYS, *COVERAGE_KEYS, *MOMENT_KEYS, "leaked_points_max", "held_ticks",
+        *_drawn(trial.scenario),
+    )  # fmt: skip
 
 
 def analyse(table: pl.DataFrame, campaign: Campaign) -> Summary:
@@ -188,13 +199,6 @@ def _paired(apart: list[float]) -> Summary | None:
     }  # fmt: skip
 
 
-def worst(table: pl.DataFrame) -> list[str]:
-    """The whole-body trials, those first that came nearest to the panel, or were so for longer."""
-    ours = table.filter(pl.col("controller") == "wb", pl.col("error").is_null())
-    order = ours.sort("true_min_m", "violations", "key", descending=[False, True, False])
-    return order["key"].to_list()
-
-
 KIND = CampaignKind(
     title="Static scenes, drawn at random",
     introduction="Panels, start postures and goals drawn round the paper's static scenes; every "
@@ -203,6 +207,8 @@ KIND = CampaignKind(
     "scene itself, the ceiling, not a result of ours; wb_memory is wb that remembers what left the "
     "sensors' view.",
     plan=plan, analyse=analyse, listings=listings, verdicts=verdicts, figures=figures,
-    captions=captions, worst=worst,
+    captions=captions,
+    # Those first that came nearest to the panel, or were so for longer.
+    worst=ranked(pl.col("controller") == "wb", true_min_m=False, violations=True),
     worst_of="wb's trials, by the least true distance",
 )  # fmt: skip

@@ -6,9 +6,8 @@ from matplotlib.figure import Figure
 
 from proxcgal.evaluation.metrics import Summary
 from proxcgal.evaluation.trial_log import TOO_CLOSE
-from proxcgal.study.bootstrap import median_interval
+from proxcgal.study.bootstrap import Distances, Pairs, draw_distances, median_interval, pairs
 from proxcgal.study.campaign import file_name
-from proxcgal.study.paired import Distances, Pairs, draw_distances, pairs
 from proxcgal.study.plotting import (
     CONTROLLER_COLOURS,
     CONTROLLER_NAMES,

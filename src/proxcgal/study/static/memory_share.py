@@ -9,8 +9,7 @@ import polars as pl
 from proxcgal.core.files import NOTHING_M
 from proxcgal.core.typing import Array
 from proxcgal.evaluation.metrics import Summary
-from proxcgal.study.bootstrap import ENOUGH, ratio_interval
-from proxcgal.study.paired import draw_distances
+from proxcgal.study.bootstrap import ENOUGH, draw_distances, ratio_interval
 
 WORSE_MM = 20.0  # nearer than without memory by more than this, a draw is listed
 _ANOTHER_WAY_M = 0.05  # goal errors so far apart are of two ways

@@ -81,9 +81,12 @@ def _draw_points(
 ) -> None:
     ax.computed_zorder = False  # the arrow belongs on top, whatever lies before it
     plain: dict[str, Any] = {"linewidths": 0, "depthshade": False}
-    clouds = ((robot_W, ROBOT_COLOUR), (sensed_W, RAW_COLOUR), (near_W, NEAR_COLOUR))
-    order = (sizes[1], sizes[0], sizes[2])
-    for zorder, ((cloud_W, colour), size) in enumerate(zip(clouds, order, strict=True), 1):
+    clouds = (
+        (robot_W, ROBOT_COLOUR, sizes[1]),
+        (sensed_W, RAW_COLOUR, sizes[0]),
+        (near_W, NEAR_COLOUR, sizes[2]),
+    )
+    for zorder, (cloud_W, colour, size) in enumerate(clouds, 1):
         ax.scatter(*cloud_W.T, s=size, color=colour, zorder=zorder, **plain)
 
 

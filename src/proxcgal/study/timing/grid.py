@@ -1,10 +1,12 @@
 """The timing grid of [WA] III-C and IV-C: both algorithms by both methods, cell by cell."""
 
 import gc
+import math
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
@@ -13,11 +15,11 @@ from proxcgal import _core
 from proxcgal.core.errors import SimulationError
 from proxcgal.core.typing import Array
 from proxcgal.evaluation.metrics import Summary
-from proxcgal.study.timing.growth import fit_growth
 from proxcgal.study.timing.inputs import Inputs
 
 ALGORITHMS = {1: "robot body removal", 2: "closest pair"}
 METHODS = ("paper", "fast")
+CONFIDENCE = 0.95  # of an exponent's interval
 SAME_M = 1e-9  # [m] both methods' distances agree to this
 
 
@@ -124,10 +126,11 @@ def time_cells(grid: Iterable[Inputs], effort: Effort) -> Iterator[TimingCell]:
 
 
 def _compare(inputs: Inputs, algorithm: int, paper: Any, fast: Any) -> None:
-    if algorithm == 1:
-        same = np.array_equal(paper, fast)
-    else:
-        same = abs(paper.distance - fast.distance) <= SAME_M
+    same = (
+        np.array_equal(paper, fast)
+        if algorithm == 1
+        else abs(paper.distance - fast.distance) <= SAME_M
+    )
     if not same:
         raise SimulationError(
             f"{inputs.robot.name}, {inputs.vertices} vertices, cloud {inputs.cloud}: 'paper' and "
@@ -172,3 +175,60 @@ def formula(algorithm: int, points: int, vertices: int) -> float:
     """Cost by [WA] (2) or (3), every constant 1, for one link: N M log V + N M, and log V more."""
     depth = float(np.log2(vertices))
     return points * depth + points + (depth if algorithm == 2 else 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Growth:
+    """Exponent of a power law, with the ends of its 95 % interval.
+
+    The ends are None where there are too few values to tell.
+    """
+
+    exponent: float
+    low: float | None
+    high: float | None
+
+
+def fit_growth(x: Sequence[float], y: Sequence[float], curve: Sequence[Hashable]) -> Growth | None:
+    """Least squares of log y = a(curve) + b log x: one exponent b for several curves.
+
+    Args:
+        x: what y grows with, above 0.
+        y: above 0.
+        curve: which curve each value belongs to; each has a factor of its own.
+
+    Returns:
+        b, or None where x does not vary within any curve.
+    """
+    log_x, log_y = np.log(np.asarray(x, np.float64)), np.log(np.asarray(y, np.float64))
+    curves = list(dict.fromkeys(curve))
+    of = np.array([curves.index(name) for name in curve])
+    for row in range(len(curves)):
+        log_x[of == row] -= log_x[of == row].mean()
+        log_y[of == row] -= log_y[of == row].mean()
+    spread = float(log_x @ log_x)
+    if spread < 1e-12:
+        return None
+    exponent = float(log_x @ log_y) / spread
+    freedom = len(log_x) - len(curves) - 1
+    if freedom < 3:
+        return Growth(exponent, None, None)
+    residual = log_y - exponent * log_x
+    deviation = float(np.sqrt(residual @ residual / freedom / spread))
+    half = student_quantile(0.5 + 0.5 * CONFIDENCE, freedom) * deviation
+    return Growth(exponent, exponent - half, exponent + half)
+
+
+def student_quantile(share: float, freedom: int) -> float:
+    """Quantile of Student's t, within 1 % at the usual shares from 3 degrees of freedom on.
+
+    Source: Abramowitz and Stegun, 26.7.5: Cornish and Fisher's expansion about the normal one.
+    """
+    z = NormalDist().inv_cdf(share)
+    terms = (
+        (z**3 + z) / 4.0,
+        (5.0 * z**5 + 16.0 * z**3 + 3.0 * z) / 96.0,
+        (3.0 * z**7 + 19.0 * z**5 + 17.0 * z**3 - 15.0 * z) / 384.0,
+        (79.0 * z**9 + 776.0 * z**7 + 1482.0 * z**5 - 1920.0 * z**3 - 945.0 * z) / 92160.0,
+    )
+    return z + math.fsum(term / freedom**power for power, term in enumerate(terms, 1))

@@ -9,7 +9,7 @@ from proxcgal.core.progress import ProgressBar
 from proxcgal.core.provenance import machine, origin
 from proxcgal.scenario.scenario import Scenario
 from proxcgal.study.plotting import png
-from proxcgal.study.runs.result_folders import ready_folders, remove_empty
+from proxcgal.study.runs.preparation import ready_folders, remove_empty
 from proxcgal.study.timing.cloud_figure import cloud_figure
 from proxcgal.study.timing.comparison import compare, cycle_verdict, sweep_table
 from proxcgal.study.timing.grid import (

@@ -57,10 +57,9 @@ def _draw_times(ax: Axes, cells: Sequence[TimingCell]) -> None:
                 color=CLOUD_COLOURS[cloud], markersize=4.5, linewidth=1.5, **style,
             )  # fmt: skip
     ax.axhline(CYCLE_US / 1000.0, zorder=1, **_CYCLE)
-    ax.set(xscale="log", yscale="log")
+    ax.set(xscale="log", yscale="log", xlabel="vertices of each link")
     for axis in (ax.xaxis, ax.yaxis):
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    ax.set_xlabel("vertices of each link", fontsize=10)
     ax.grid(which="major", color="#E4E4E4", linewidth=0.6)
     tidy_axes(ax)
 

@@ -7,13 +7,11 @@ from proxcgal.core.errors import ConfigError
 from proxcgal.core.progress import OnProgress
 from proxcgal.evaluation.metrics import Summary
 from proxcgal.scenario.walkthrough_scenario import WalkScenario
-from proxcgal.study.campaign import Campaign, Trial
-from proxcgal.study.campaign_kind import CampaignKind, CampaignRequest
-from proxcgal.study.campaign_plan import CampaignPlan
+from proxcgal.study.campaign import Campaign, CampaignKind, CampaignPlan, CampaignRequest, Trial
 from proxcgal.study.campaign_store import Row
 from proxcgal.study.trial_simulation import robot_of
 from proxcgal.study.walkthrough.draws import BEHAVIOURS, OWN, draw_walk
-from proxcgal.study.walkthrough.stops_figure import STOPPED, figures
+from proxcgal.study.walkthrough.figures import STOPPED, figures
 from proxcgal.study.walkthrough.texts import captions, listings, verdicts
 from proxcgal.trial.walkthrough.playback import play
 from proxcgal.trial.walkthrough.setup import WalkSetup

@@ -1,12 +1,14 @@
-"""Walk-throughs over time, in the form of [WT] Figs. 6 to 8, and ratings in that of Fig. 9."""
+"""Walk-throughs over time, as [WT] Figs. 6 to 8, ratings as Fig. 9, and how stops are spread."""
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+import polars as pl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from proxcgal.core.typing import Array
+from proxcgal.evaluation.metrics import Summary
 from proxcgal.study.plotting import (
     DASHED,
     DOTTED,
@@ -22,6 +24,9 @@ from proxcgal.trial.walkthrough.run import WalkResult
 BLUE, ORANGE, RED, GREEN = "#0072B2", "#E69F00", "#D55E00", "#009E73"
 SCALE = 1.08  # of the tallest curve: how high the STO signal is drawn
 _BEFORE, _AFTER = 0.10, 0.45  # [s] of the magnified window, round the trip
+COLOURS = {"overspeed": "#D55E00", "too_close": "#0072B2", "closing_fast": "#009E73"}
+#: Trials in which something tripped; without any that ended the column has no type.
+STOPPED = pl.col("tripped").cast(pl.String) != "none"
 
 
 def trip_figure(log: WalkLog, *, title: str, window: Sequence[float] | None = None) -> Figure:
@@ -36,15 +41,15 @@ def trip_figure(log: WalkLog, *, title: str, window: Sequence[float] | None = No
         window: [s] of the magnification; left out: round the stop.
     """
     trip = log.trips[0]
+    watched = {
+        "distance": (log.distance, log.distance_limit, "distance [m]"),
+        "relative_velocity": (log.velocity, log.velocity_limit, "relative velocity [m/s]"),
+        "joint_speed": (log.speed_ratio, 1.0, "joint speed, of its bound [-]"),
+        "joint_acceleration": (log.acceleration_ratio, 1.0, "joint accel., of its bound [-]"),
+    }
     rows = [(log.tcp_speed, log.tcp_limit, "tool speed [m/s]", trip.function == "tcp_speed")]
-    if trip.function == "distance":
-        rows.insert(0, (log.distance, log.distance_limit, "distance [m]", True))
-    elif trip.function == "relative_velocity":
-        rows.insert(0, (log.velocity, log.velocity_limit, "relative velocity [m/s]", True))
-    elif trip.function == "joint_speed":
-        rows.insert(0, (log.speed_ratio, 1.0, "joint speed, of its bound [-]", True))
-    elif trip.function == "joint_acceleration":
-        rows.insert(0, (log.acceleration_ratio, 1.0, "joint accel., of its bound [-]", True))
+    if trip.function in watched:
+        rows.insert(0, (*watched[trip.function], True))
     inside = (trip.time_s - _BEFORE, trip.time_s + _AFTER) if window is None else window
     figure = new_figure(8.4, 1.0 + 2.3 * len(rows), title)
     axes = figure.subplots(len(rows), 2, squeeze=False, width_ratios=(1.5, 1.0), sharey="row")
@@ -160,9 +165,47 @@ def ratings_figure(ratings: Mapping[str, Sequence[float]]) -> Figure:
             meanprops={"marker": "^", "markerfacecolor": GREEN, "markeredgecolor": GREEN},
         )  # fmt: skip
         box.set(ylim=(-0.5, 10.5), ylabel=f"{name}\nrating, 0 to 10")
-        edges = np.arange(-0.5, 11.0)
-        share = np.histogram(values, edges)[0] / max(len(values), 1)
+        share = np.histogram(values, np.arange(-0.5, 11.0))[0] / max(len(values), 1)
         bars.bar(np.arange(11), share, color=BLUE, width=0.8)
         bars.set(xlabel="rating", ylabel="share of testers", xticks=range(11))
         tidy_axes(box, bars)
     return figure
+
+
+def figures(table: pl.DataFrame, _: Summary | None = None) -> dict[str, Figure]:
+    """Distribution of stop times and distances; none where nothing stopped."""
+    done = table.filter(pl.col("error").is_null(), STOPPED)
+    if done.is_empty():
+        return {}
+    figure = new_figure(8.0, 3.7)
+    for ax, (column, label, limit) in zip(
+        figure.subplots(1, 2, sharey=True),
+        (
+            ("stop_time_s", "stopping time [s]", "stop_time_bound_s"),
+            ("stop_distance_m", "way of the tool [m]", "min_distance_m"),
+        ),
+        strict=True,
+    ):  # fmt: skip
+        for name, colour in COLOURS.items():
+            values = done.filter(pl.col("wish") == name)[column].drop_nulls().to_numpy()
+            if len(values):
+                ax.ecdf(values, color=colour, lw=1.6, label=name)
+        bound = float(done[limit][0])  # one for all, by --set too
+        ax.axvline(bound, color=GREY, lw=1.0, ls=DASHED)
+        ax.annotate(
+            "declared" if column == "stop_time_s" else "min_distance",
+            (bound, 0.04),
+            xytext=(-4, 0),
+            textcoords="offset points",
+            ha="right",
+            fontsize=9,
+            color=GREY,
+        )
+        most = done[column].drop_nulls().max()  # what is over the bound must be seen
+        farthest = max(1.15 * bound, 1.05 * float(most or 0.0))  # type: ignore[arg-type]
+        ax.set(xlim=(0.0, farthest), xlabel=label)
+        tidy_axes(ax)
+    figure.axes[0].set(ylabel="share of stops [-]", ylim=(0.0, 1.04))
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False, fontsize=9)
+    return {"stops.png": figure}

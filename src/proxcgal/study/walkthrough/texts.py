@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from proxcgal.evaluation.metrics import Summary
-from proxcgal.study.listing import Listing
+from proxcgal.study.campaign import Listing
 from proxcgal.study.walkthrough.draws import OWN
 
 
