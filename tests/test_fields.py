@@ -11,9 +11,12 @@ from types import ModuleType
 from typing import Any
 
 import pytest
+from pydantic import ValidationError
 
 from proxcgal import _core
-from proxcgal.errors import ConfigError
+from proxcgal.core.errors import ConfigError
+from proxcgal.core.schema import table_from
+from proxcgal.scenario.reference import rows_of
 
 ROOT = Path(__file__).parents[1]
 TABLES = _core.field_tables()
@@ -120,6 +123,19 @@ def test_a_field_of_a_new_struct_is_in_its_table(dummy: ModuleType) -> None:
     assert not stretch.may_be_infinite
     assert stretch.sentence == "Length of the stretch."
     assert (colour.type, colour.default, colour.choices) == ("enum", "green", ["red", "green"])
+
+
+def test_a_field_of_a_new_struct_is_a_key_and_in_the_reference(dummy: ModuleType) -> None:
+    keys = table_from("DummyConfig", dummy.field_tables()["DummyConfig"])
+    assert keys().model_dump() == {"stretch": 0.25, "colour": "green"}
+    assert keys(stretch=2.0, colour="red").model_dump() == {"stretch": 2.0, "colour": "red"}
+    for wrong in ({"stretch": 0.0}, {"stretch": 3.0}, {"colour": "blue"}, {"length": 1.0}):
+        with pytest.raises(ValidationError):
+            keys(**wrong)
+    assert rows_of(keys, "dummy.") == [
+        "| `dummy.stretch` | 0.25 | [m] Length of the stretch. |",
+        '| `dummy.colour` | "green" | Colour of the body. |',
+    ]
 
 
 @pytest.mark.parametrize("name", MADE)

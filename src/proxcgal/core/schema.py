@@ -1,7 +1,7 @@
 """Tables of a file that users write: strict types, bounds, and defaults of the C++ core."""
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -47,7 +47,7 @@ def core_table(struct: str, *, only: Collection[str] = (), omit: Collection[str]
         only: these settings; empty for all.
         omit: settings that a file does not have.
     """
-    return _table(struct, field_tables()[struct], only, omit)
+    return table_from(struct, field_tables()[struct], only, omit)
 
 
 def core_key(struct: str, setting: str) -> Any:
@@ -66,9 +66,13 @@ def _record(struct: str, setting: str) -> FieldRecord:
     return next(each for each in field_tables()[struct] if each.name == setting)
 
 
-def _table(
-    struct: str, records: list[FieldRecord], only: Collection[str], omit: Collection[str]
+def table_from(
+    struct: str,
+    records: Sequence[FieldRecord],
+    only: Collection[str] = (),
+    omit: Collection[str] = (),
 ) -> type[Section]:
+    """The same from a table of fields, such as another module's of its own."""
     keys: dict[str, Any] = {
         record.name: (_annotation(record), _field(record))
         for record in records
