@@ -132,8 +132,6 @@ def overrides(options: RunOptions) -> list[str]:
         str(path.expanduser().absolute()) for path in flat(options.package_dir, "--package-dir")
     ]:
         changes.append("package_dirs=" + json.dumps(folders))
-    if options.subject is not None:
-        changes.append(f"operator.subject={options.subject}")
-    if options.seed is not None:
-        changes.append(f"seed={options.seed}")
+    numbers = {"operator.subject": options.subject, "seed": options.seed}
+    changes += [f"{key}={number}" for key, number in numbers.items() if number is not None]
     return changes + flat(options.set)

@@ -100,10 +100,11 @@ def findings_parts(verdicts: Iterable[str], listings: Iterable[Listing]) -> Iter
     for sentence in verdicts:
         yield f"<p>{escape(sentence)}</p>"
     for listing in listings:
-        yield from _listing_part(listing)
+        yield from listing_part(listing)
 
 
-def _listing_part(listing: Listing) -> Iterator[str]:
+def listing_part(listing: Listing) -> Iterator[str]:
+    """A table of results."""
     styles = ["left" if column < listing.left else "" for column in range(len(listing.names))]
     return table_part(
         map(head, listing.names, listing.units, styles),

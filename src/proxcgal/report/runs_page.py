@@ -10,12 +10,14 @@ from proxcgal.report.document import (
     cell,
     document,
     head,
+    listing_part,
     origin_part,
     recordings_part,
     table_part,
 )
 from proxcgal.report.replays import Replays
 from proxcgal.report.stored_results import About, StoredNumbers, StoredRun
+from proxcgal.study.campaign import Listing
 from proxcgal.study.runs.pictures import SIDE_BY_SIDE
 
 PICTURES = (
@@ -150,27 +152,23 @@ def _beside_a_person(run: StoredRun) -> bool:
 def _phases(run: StoredRun) -> Iterator[str]:
     """Mean distances beside a person."""
     phases = [*dict.fromkeys(p for n in run.summary.controllers.values() for p in n.mean_m)]
-    heads = [head("controller", style="left")]
-    for phase in phases:
-        heads += [head(phase, "true, m"), head("seen", "m")]
-    rows = [
-        [_named(name)]
-        + [
-            cell(in_metres(numbers.mean_m.get(phase, {}).get(which)))
-            for phase in phases
-            for which in ("true", "seen")
-        ]
-        for name, numbers in run.summary.controllers.items()
-    ]
-    return table_part(
-        heads, rows,
-        "Mean distance to the person, over the cycle and in each phase: true, and seen (the "
-        "filtered cloud's, moments without one left out).",
-    )  # fmt: skip
-
-
-def _named(controller: str) -> str:
-    return cell(NAMES.get(controller, controller), "left")
+    columns = [(phase, which) for phase in phases for which in ("true", "seen")]
+    return listing_part(
+        Listing(
+            caption="Mean distance to the person, over the cycle and in each phase: true, and "
+            "seen (the filtered cloud's, moments without one left out).",
+            names=("controller", *(p if which == "true" else which for p, which in columns)),
+            units=("", *("true, m" if which == "true" else "m" for _, which in columns)),
+            rows=[
+                (
+                    NAMES.get(name, name),
+                    *(in_metres(numbers.mean_m.get(p, {}).get(which)) for p, which in columns),
+                )
+                for name, numbers in run.summary.controllers.items()
+            ],
+            left=1,
+        )
+    )
 
 
 def _table(runs: Sequence[StoredRun]) -> Iterator[str]:
@@ -199,7 +197,7 @@ def _rows(run: StoredRun) -> Iterator[Iterator[str]]:
     def row(place: int, name: str, own: StoredNumbers) -> Iterator[str]:
         if place == 0:
             yield cell(summary.scenario, "left", rows=count)
-        yield _named(name)
+        yield cell(NAMES.get(name, name), "left")
         for value in (own.true_min_m, own.true_final_m, own.seen_min_m, own.goal_error_m):
             yield cell(in_metres(value))
         yield cell("-" if own.violations is None else own.violations)
@@ -248,17 +246,20 @@ def _coverage(run: StoredRun) -> Iterator[str]:
     }
     if all(share is None for shares in found.values() for share in shares):
         return iter(())
-    heads = [head(name, "%") for name in ("in view", "remembered", "forgotten", "never seen")]
-    rows = [
-        [_named(name), *(cell("-" if s is None else f"{100.0 * s:.0f}") for s in shares)]
-        for name, shares in found.items()
-    ]
-    return table_part(
-        [head("controller", style="left"), *heads], rows,
-        "The truly closest points of the scene: in view of a sensor at the last scan; remembered, "
-        "within the memory's time before (whether or not a controller with memory ran); forgotten, "
-        "longer ago; never seen.",
-    )  # fmt: skip
+    return listing_part(
+        Listing(
+            caption="The truly closest points of the scene: in view of a sensor at the last scan; "
+            "remembered, within the memory's time before (whether or not a controller with memory "
+            "ran); forgotten, longer ago; never seen.",
+            names=("controller", "in view", "remembered", "forgotten", "never seen"),
+            units=("", "%", "%", "%", "%"),
+            rows=[
+                (NAMES.get(name, name), *("-" if s is None else f"{100.0 * s:.0f}" for s in shares))
+                for name, shares in found.items()
+            ],
+            left=1,
+        )
+    )
 
 
 def _trials(run: StoredRun) -> Iterator[str]:

@@ -11,7 +11,7 @@ import polars as pl
 from proxcgal.core.errors import ConfigError, ProxError
 from proxcgal.core.progress import OnProgress
 from proxcgal.study.campaign import Campaign, Ended, Perform, Trial
-from proxcgal.study.campaign_store import CampaignStore, Outcome, Row
+from proxcgal.study.campaign_store import CampaignStore, Outcome
 from proxcgal.study.jobs import StoppedError
 from proxcgal.study.workers import Pool
 
@@ -102,17 +102,14 @@ def trials_table(ended: Sequence[Ended], columns: Sequence[str]) -> pl.DataFrame
         ended: all trials.
         columns: of the numbers; null where a trial failed.
     """
-    rows: list[Row] = []
-    for each in ended:
-        trial, outcome = each.trial, each.outcome
-        numbers = outcome.row or {}
-        rows.append(
-            {"key": trial.key, "name": trial.name, **trial.tags}
-            | {"scenario": trial.scenario.name, "robot": trial.scenario.robot}
-            | {"controller": trial.controller, "seed": trial.seed}
-            | {column: numbers.get(column) for column in columns}
-            | {"error": outcome.error, "command": trial.command, "wall_s": outcome.wall_s}
-        )
+    rows = [
+        {"key": trial.key, "name": trial.name, **trial.tags}
+        | {"scenario": trial.scenario.name, "robot": trial.scenario.robot}
+        | {"controller": trial.controller, "seed": trial.seed}
+        | {column: (outcome.row or {}).get(column) for column in columns}
+        | {"error": outcome.error, "command": trial.command, "wall_s": outcome.wall_s}
+        for trial, outcome in ((each.trial, each.outcome) for each in ended)
+    ]
     table = pl.DataFrame(rows, schema_overrides={"error": pl.String}, infer_schema_length=None)
     empty = [name for name in columns if table.schema[name] == pl.Null]  # all trials failed
     return table.with_columns(pl.col(empty).cast(pl.Float64))

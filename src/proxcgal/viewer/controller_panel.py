@@ -75,12 +75,10 @@ class ControllerPanel(Panel):
         """Controls of another model; `back` is shown where the requested choice does not fit."""
         if back is not None:
             self._choice = back  # first: the events of the controls then change nothing
-            self._lists["controller"].value = back.controller
-            self._lists["robot"].value = back.robot
-            self._lists["vertices"].value = _count(back.vertices)
             self._noise.value = back.noise
-            for name, slider in self._sliders.items():
-                slider.value = getattr(back, name)
+            for name, control in (*self._lists.items(), *self._sliders.items()):
+                value = getattr(back, name)
+                control.value = _count(value) if name == "vertices" else value
         if self._model is None or self._model.key != model.key:
             self._renew(model)
         self._model = model

@@ -81,20 +81,18 @@ def plot_whole_run(
 ) -> None:
     """The same plots of a recorded run, and of the one that was computed again beside it."""
     curves: list[Curve] = [("seen", _SEEN, ()), ("true", _TRUE, (5, 4))]
-    time = np.array([moment.elapsed for moment in moments])
+    active: list[Curve] = [("activation", _GREEN, ())]
     distances = [[m.seen for m in moments], [m.true for m in moments]]
+    activations = [[m.activation for m in moments]]
     if again is not None:
         curves.append(("seen, recomputed", _ORANGE, ()))
+        active.append(("recomputed", _ORANGE, ()))
         distances.append([m.seen for m in again])
-    chart = _distances(gui, *curves)
+        activations.append([m.activation for m in again])
+    time = np.array([moment.elapsed for moment in moments])
     bounds = [np.full_like(time, model.d_min), np.full_like(time, model.d_min + model.buffer)]
-    chart.data = (time, *(_drawn(np.array(each)) for each in distances), *bounds)
-    curves = [("activation", _GREEN, ())]
-    activations = [np.array([m.activation for m in moments])]
-    if again is not None:
-        curves.append(("recomputed", _ORANGE, ()))
-        activations.append(np.array([m.activation for m in again]))
-    _activations(gui, *curves).data = (time, *activations)
+    _distances(gui, *curves).data = (time, *(_drawn(np.array(d)) for d in distances), *bounds)
+    _activations(gui, *active).data = (time, *map(np.array, activations))
 
 
 def _distances(gui: viser.GuiApi, *curves: Curve) -> Any:

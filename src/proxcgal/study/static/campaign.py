@@ -95,8 +95,10 @@ def perform(trial: Trial, report: OnProgress) -> Row:
     kinds = log.sightings or (None, None)
     for name, sighting in zip(("true_min", "true_final"), kinds, strict=True):
         known = sighting is not None and np.isfinite(sighting.age_s)
-        row[f"sighting_at_{name}"] = sighting.kind if sighting else None
-        row[f"sighting_age_at_{name}_s"] = sighting.age_s if sighting and known else None
+        row |= {
+            f"sighting_at_{name}": sighting.kind if sighting else None,
+            f"sighting_age_at_{name}_s": sighting.age_s if sighting and known else None,
+        }
     return {
         **row,
         "leaked_points_max": numbers["leaked_points_max"],

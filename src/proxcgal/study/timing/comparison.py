@@ -40,16 +40,18 @@ def compare(cells: Iterable[Mapping[str, Any]]) -> list[Comparison]:
 
 def sweep_table(comparisons: Sequence[Comparison]) -> str:
     """A line a comparison, for a terminal."""
+    inputs = ("robot", "cloud", "vertices", "points", "algorithm")
+    heads = [(*inputs, "paper", "fast", "ratio"), ("", "", "", "", "", "[us]", "[us]", "")]
     rows = [
-        ("robot", "cloud", "vertices", "points", "algorithm", "paper", "fast", "ratio"),
-        ("", "", "", "", "", "[us]", "[us]", ""),
+        (
+            *(str(c.paper[key]) for key in inputs),
+            f"{c.paper['median_us']:.0f}",
+            f"{c.fast['median_us']:.1f}",
+            f"{c.ratio:.1f}",
+        )
+        for c in comparisons
     ]
-    for c in comparisons:
-        texts = (c.paper[key] for key in ("robot", "cloud"))
-        numbers = (str(c.paper[key]) for key in ("vertices", "points", "algorithm"))
-        times = (f"{c.paper['median_us']:.0f}", f"{c.fast['median_us']:.1f}", f"{c.ratio:.1f}")
-        rows.append((*texts, *numbers, *times))
-    return aligned(rows, left=2, heads=2)
+    return aligned([*heads, *rows], left=2, heads=len(heads))
 
 
 def cycle_verdict(comparisons: Sequence[Comparison]) -> str:

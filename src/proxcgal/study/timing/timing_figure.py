@@ -1,7 +1,7 @@
 """The timing grid as curves, in the form of the paper's Fig. 10."""
 
 from collections.abc import Sequence
-from itertools import zip_longest
+from itertools import chain, zip_longest
 from typing import Any
 
 from matplotlib.axes import Axes
@@ -80,5 +80,4 @@ def _legend(cells: Sequence[TimingCell]) -> list[Line2D]:
     label = f"sensors' cycle, {CYCLE_US / 1000.0:g} ms"
     methods.append(Line2D([], [], label=label, **_CYCLE))
     nothing = Line2D([], [], linestyle="none", label=" ")
-    columns = zip_longest(clouds, methods, fillvalue=nothing)
-    return [handle for column in columns for handle in column]
+    return list(chain.from_iterable(zip_longest(clouds, methods, fillvalue=nothing)))

@@ -78,8 +78,7 @@ def _curve(ax: Axes, log: WalkLog, values: Array, limit: float | None) -> None:
         ax.axhline(limit, color=GREY, lw=1.0, ls=DOTTED, label="limit")
     ax.step(log.time, np.where(log.torque, top, 0.0), color=ORANGE, lw=1.3, where="post",
             label="STO, scaled")  # fmt: skip
-    low = min(0.0, float(finite.min(initial=0.0)))
-    ax.set_ylim(1.05 * low, 1.06 * top)
+    ax.set_ylim(1.05 * float(finite.min(initial=0.0)), 1.06 * top)
     tidy_axes(ax)
 
 
