@@ -11,7 +11,7 @@ from proxcgal.core.modes import STOP
 from proxcgal.core.transforms import pose_errors
 from proxcgal.evaluation.termination import Outcome
 from proxcgal.models.robots import Robot
-from proxcgal.server.goal_ledger import GoalLedger, Pursued
+from proxcgal.server.goal_lifecycle import GoalLedger, Pursued
 from proxcgal.server.goals import (
     BASE,
     GoalFeedback,

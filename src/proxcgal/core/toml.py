@@ -1,4 +1,4 @@
-"""TOML in and out: dotted overrides, and a writer for what the standard library only reads."""
+"""TOML in and out: with a writer for what the standard library only reads."""
 
 import json
 import math
@@ -11,8 +11,8 @@ from proxcgal.core.errors import ConfigError
 
 Table = dict[str, Any]
 
-_DEEPEST = 64  # levels of tables and arrays: at some hundreds, what reads them would end
-_TOO_DEEP = f"must not be nested more than {_DEEPEST} deep"
+DEEPEST = 64  # levels of tables and arrays: at some hundreds, what reads them would end
+TOO_DEEP = f"must not be nested more than {DEEPEST} deep"
 _BARE = re.compile(r"[A-Za-z0-9_-]+")  # a key that needs no quotes
 
 
@@ -24,65 +24,18 @@ def parse(text: str, origin: str) -> Table:
             deeply.
     """
     try:
-        return _loaded(text)
+        return loaded(text)
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{origin}: not TOML: {error}") from None
     except RecursionError:
-        raise ConfigError(f"{origin}: {_TOO_DEEP}") from None
+        raise ConfigError(f"{origin}: {TOO_DEEP}") from None
 
 
-def override(table: Table, assignment: str) -> str:
-    """Sets one key of nested tables from `key.sub=value`, in place.
-
-    The value has TOML syntax; what is not a TOML value is taken as a string, so that
-    `robot=panda` needs no quotes. A number steps into an array: `obstacle.0.size=[1, 1, 1]`.
-
-    Returns:
-        The dotted key that was set, without spaces.
-
-    Raises:
-        ConfigError: no `=`, an empty key, more than a value, nested too deeply, or a step into what
-            is no table or array.
-    """
-    key, equals, text = assignment.partition("=")
-    steps = [step.strip() for step in key.split(".")]
-    if not equals or not all(steps):
-        raise ConfigError(f"override {assignment!r}: must have the form key.sub=value")
-    if len(steps) > _DEEPEST:
-        raise ConfigError(f"override {assignment!r}: {_TOO_DEEP}")
-    try:
-        value, *more = _loaded(f"value = {text}").values()
-    except tomllib.TOMLDecodeError:
-        value, more = text.strip(), []
-    except RecursionError:
-        raise ConfigError(f"override {assignment!r}: {_TOO_DEEP}") from None
-    if more:
-        raise ConfigError(f"override {assignment!r}: must have one value, and no lines after it")
-    place: Any = table
-    for depth, step in enumerate(steps):
-        within: Any = step
-        if isinstance(place, list):
-            if not (step.isdecimal() and int(step) < len(place)):
-                raise ConfigError(
-                    f"override {assignment!r}: {'.'.join(steps[:depth])} has the entries "
-                    f"0 to {len(place) - 1}, not {step}"
-                )
-            within = int(step)
-            steps[depth] = str(within)
-        elif not isinstance(place, dict):
-            raise ConfigError(f"override {assignment!r}: {'.'.join(steps[:depth])} is no table")
-        if depth == len(steps) - 1:
-            place[within] = value
-        else:
-            place = place.setdefault(within, {}) if isinstance(place, dict) else place[within]
-    return ".".join(steps)
-
-
-def _loaded(text: str) -> Table:
-    """Raises: RecursionError: deeper than `_DEEPEST`, by brackets or by dotted keys."""
+def loaded(text: str) -> Table:
+    """Raises: RecursionError: deeper than `DEEPEST`, by brackets or by dotted keys."""
     table = tomllib.loads(text)
     level: list[Any] = [table]
-    for _ in range(_DEEPEST + 1):
+    for _ in range(DEEPEST + 1):
         level = [item for place in level for item in _inside(place)]
         if not level:
             return table

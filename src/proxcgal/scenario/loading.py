@@ -12,6 +12,7 @@ from proxcgal.core.errors import ConfigError
 from proxcgal.models.formats.paths import is_robot_file
 from proxcgal.scenario.hri_scenario import HriScenario
 from proxcgal.scenario.joint_scenario import JointScenario
+from proxcgal.scenario.overrides import override
 from proxcgal.scenario.problems import lines
 from proxcgal.scenario.scenario import Scenario
 from proxcgal.scenario.walkthrough_scenario import GuidedScenario, WalkScenario
@@ -76,7 +77,7 @@ def change_scenario(scenario: Scenario, origin: str, overrides: Sequence[str]) -
 
 
 def _checked(table: dict[str, Any], origin: str, overrides: Sequence[str]) -> Scenario:
-    keys = [toml.override(table, assignment) for assignment in overrides]
+    keys = [override(table, assignment) for assignment in overrides]
     kind = table.get("kind", "static")
     model = KINDS.get(kind, Scenario) if isinstance(kind, str) else Scenario
     try:

@@ -19,7 +19,7 @@ from proxcgal.core.typing import Array
 from proxcgal.models.robots import Robot
 from proxcgal.scenario.joint_scenario import JointScenario
 from proxcgal.scenario.loading import load_scenario
-from proxcgal.server.goal_ledger import GoalLedger
+from proxcgal.server.goal_lifecycle import GoalLedger
 from proxcgal.server.goals import (
     GoalFeedback,
     GoalRefusedError,

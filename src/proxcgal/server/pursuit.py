@@ -8,7 +8,7 @@ from proxcgal.core.transforms import pose_errors
 from proxcgal.core.typing import Array
 from proxcgal.evaluation.stall_diagnosis import concluded
 from proxcgal.evaluation.termination import Ending, GoalWatch, Outcome
-from proxcgal.server.goal_ledger import GoalLedger, Pursued
+from proxcgal.server.goal_lifecycle import GoalLedger, Pursued
 from proxcgal.server.goals import JointGoal, goal_pose
 from proxcgal.server.joint_arm import JointArm
 

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "proxcgal/safety/safety_logic.hpp"
+#include "proxcgal/safety/torque_logic.hpp"
 #include "proxcgal/safety/separation.hpp"
 
 namespace proxcgal {

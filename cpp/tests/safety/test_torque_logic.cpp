@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "meshes.hpp"
-#include "proxcgal/safety/safety_logic.hpp"
+#include "proxcgal/safety/torque_logic.hpp"
 
 namespace proxcgal {
 namespace {

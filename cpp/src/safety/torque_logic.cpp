@@ -1,4 +1,4 @@
-#include "proxcgal/safety/safety_logic.hpp"
+#include "proxcgal/safety/torque_logic.hpp"
 
 #include <algorithm>
 #include <cmath>
