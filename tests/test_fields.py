@@ -12,11 +12,11 @@ from typing import Any
 
 import pytest
 from pydantic import ValidationError
+from scenario_keys import rows_of
 
 from proxcgal import _core
 from proxcgal.core.errors import ConfigError
 from proxcgal.core.schema import table_from
-from proxcgal.scenario.reference import rows_of
 
 ROOT = Path(__file__).parents[1]
 TABLES = _core.field_tables()

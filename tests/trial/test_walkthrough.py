@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 import polars as pl
 import pytest
+from scenario_keys import rows_of
 
 from proxcgal.core.errors import ConfigError, RecordingError, SimulationError
 from proxcgal.models.builtin import ga_ol
 from proxcgal.scenario.loading import load_scenario, parse_scenario
-from proxcgal.scenario.reference import rows_of
 from proxcgal.scenario.walkthrough_keys import LegKeys
 from proxcgal.scenario.walkthrough_scenario import GuidedScenario, WalkScenario
 from proxcgal.sim.physics import Physics

@@ -1,6 +1,6 @@
 """Reference of the scenario keys: the rows of the documentation's tables, made from the schema.
 
-`python -m proxcgal.scenario.reference docs/*.md` brings the tables of these pages up to date.
+`python docs/scenario_keys.py docs/*.md` brings the tables of these pages up to date.
 """
 
 import re
