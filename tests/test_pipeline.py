@@ -132,5 +132,5 @@ def test_bad_input_is_refused_by_name(robot, call, message):
 
 
 def test_an_unknown_method_is_refused_with_the_names(robot):
-    with pytest.raises(px.ConfigError, match="method is 'quick', allowed are 'fast', 'paper'"):
+    with pytest.raises(px.ConfigError, match="method is 'quick', must be one of 'fast', 'paper'"):
         px.closest_pair(robot, np.zeros(robot.n_q), np.zeros((1, 3)), method="quick")

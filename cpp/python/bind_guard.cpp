@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "bind_fields.hpp"
 #include "proxcgal/safety/guard.hpp"
 #include "robot_arguments.hpp"
 #include "topics.hpp"
@@ -10,9 +11,6 @@ namespace proxcgal::binding {
 namespace {
 
 using Pairs = std::vector<std::pair<std::string, std::string>>;
-
-constexpr std::pair<const char*, TorqueState> kStates[] = {
-    {"off", TorqueState::kOff}, {"on", TorqueState::kOn}, {"stopping", TorqueState::kStopping}};
 
 double separation_needed(const IsoSeparation& iso, double robot_speed, double stop_time) {
   const auto usable = [](double value) { return std::isfinite(value) && value >= 0.0; };
@@ -59,88 +57,14 @@ void bind_guard(nb::module_& m) {
       .def_ro("name", &LinkCapsule::name, "For messages and lists.")
       .def_ro("link", &LinkCapsule::link, "Row of link_names.")
       .def_ro("shape_L", &LinkCapsule::shape_L, "In the link's frame.");
-  nb::class_<IsoSeparation>(m, "IsoSeparation",
-                            "What the separation distance of ISO/TS 15066 is computed with.")
-      .def(
-          "__init__",
-          [](IsoSeparation* self, double human_speed, double reaction_time, double intrusion,
-             double human_uncertainty, double robot_uncertainty) {
-            const IsoSeparation iso{human_speed, reaction_time, intrusion, human_uncertainty,
-                                    robot_uncertainty};
-            iso.validate();
-            new (self) IsoSeparation(iso);
-          },
-          nb::kw_only(), "human_speed"_a = IsoSeparation{}.human_speed,
-          "reaction_time"_a = IsoSeparation{}.reaction_time,
-          "intrusion"_a = IsoSeparation{}.intrusion,
-          "human_uncertainty"_a = IsoSeparation{}.human_uncertainty,
-          "robot_uncertainty"_a = IsoSeparation{}.robot_uncertainty)
-      .def_ro("human_speed", &IsoSeparation::human_speed, "v_h [m/s]")
-      .def_ro("reaction_time", &IsoSeparation::reaction_time, "T_r [s]")
-      .def_ro("intrusion", &IsoSeparation::intrusion, "C [m]")
-      .def_ro("human_uncertainty", &IsoSeparation::human_uncertainty, "Z_d [m]")
-      .def_ro("robot_uncertainty", &IsoSeparation::robot_uncertainty, "Z_r [m]");
+  bind_fields<IsoSeparation>(m);
   m.def("protective_distance", &separation_needed, "iso"_a, "robot_speed"_a, "stop_time"_a,
         "Separation distance of ISO/TS 15066 [m] for constant speeds [m/s] and constant "
         "deceleration over the stopping time [s].");
-  nb::class_<GuardConfig>(m, "GuardConfig",
-                          "What the guard of walk-through programming is set up with. "
-                          "Source: [WT] section 3.")
-      .def(
-          "__init__",
-          [](GuardConfig* self, std::vector<LinkCapsule> capsules, nb::handle q_reference,
-             double tcp_speed, nb::handle qd_max, nb::handle qdd_max, double stop_time,
-             double rest_speed, double period, double max_gap, double min_distance,
-             double max_velocity, std::vector<std::string> pairs, std::vector<std::string> ends,
-             double human_radius, double human_height, nb::handle human_offset, bool subtract_human,
-             const IsoSeparation& iso, std::vector<std::string> accept) {
-            GuardConfig config;
-            config.capsules = std::move(capsules);
-            config.q_reference = joints_from(q_reference, "q_reference");
-            config.tcp_speed = tcp_speed;
-            config.qd_max = joints_from(qd_max, "qd_max");
-            config.qdd_max = joints_from(qdd_max, "qdd_max");
-            config.timing = {stop_time, rest_speed, period, max_gap};
-            config.separation = {
-                {human_radius, human_height,
-                 human_offset.is_none() ? OperatorCapsule{}.offset_T
-                                        : vector3_from(human_offset, "human_offset")},
-                std::move(pairs),
-                std::move(ends),
-                min_distance,
-                max_velocity,
-                subtract_human,
-                iso};
-            config.accept = std::move(accept);
-            new (self) GuardConfig(std::move(config));
-          },
-          nb::kw_only(), "capsules"_a, "q_reference"_a, "tcp_speed"_a = GuardConfig{}.tcp_speed,
-          "qd_max"_a = nb::none(), "qdd_max"_a = nb::none(),
-          "stop_time"_a = SafetyTiming{}.stop_time, "rest_speed"_a = SafetyTiming{}.rest_speed,
-          "period"_a = SafetyTiming{}.period, "max_gap"_a = SafetyTiming{}.max_gap,
-          "min_distance"_a = SeparationConfig{}.min_distance,
-          "max_velocity"_a = SeparationConfig{}.max_velocity,
-          "pairs"_a = std::vector<std::string>{}, "ends"_a = std::vector<std::string>{},
-          "human_radius"_a = OperatorCapsule{}.radius, "human_height"_a = OperatorCapsule{}.height,
-          "human_offset"_a = nb::none(), "subtract_human"_a = false, "iso"_a = IsoSeparation{},
-          "accept"_a = std::vector<std::string>{},
-          "Args: capsules, at least one; q_reference (n,) [rad] of eqs. (1) and (2); tcp_speed "
-          "[m/s]; qd_max [rad/s], qdd_max [rad/s^2] (n,), None for those of the equations; "
-          "stop_time, period, max_gap [s]; rest_speed [rad/s]; min_distance [m]; max_velocity "
-          "[m/s]; pairs, ends: names of capsules, empty for all; human_radius, human_height [m] "
-          "and human_offset (3,) [m] of the operator's capsule, its middle in the tool's frame; "
-          "accept, as `guard_contradictions` names them.\n"
-          "Raises: GeometryError for a wrong shape or what is not finite; `Guard` checks the rest.")
-      .def_ro("tcp_speed", &GuardConfig::tcp_speed, "[m/s] xd_UB")
-      .def_ro("accept", &GuardConfig::accept, "Contradictions taken as they are, item by item.")
-      .def_prop_ro(
-          "stop_time", [](const GuardConfig& c) { return c.timing.stop_time; }, "[s] declared.")
-      .def_prop_ro(
-          "rest_speed", [](const GuardConfig& c) { return c.timing.rest_speed; }, "[rad/s]")
-      .def_prop_ro(
-          "min_distance", [](const GuardConfig& c) { return c.separation.min_distance; }, "[m]")
-      .def_prop_ro(
-          "max_velocity", [](const GuardConfig& c) { return c.separation.max_velocity; }, "[m/s]");
+  bind_fields<GuardConfig, Access::kReadOnly, 0, Validated::kByItsUser>(
+      m,
+      "Args: q_reference, qd_max, qdd_max (n,); human_offset (3,); None for the defaults.\n"
+      "Raises: GeometryError for a wrong shape or what is not finite; `Guard` checks the rest.");
   m.def(
       "guard_contradictions",
       [](const Robot& robot, const GuardConfig& config) {
@@ -159,7 +83,7 @@ void bind_guard(nb::module_& m) {
           "torque", [](const GuardOutput& o) { return o.safety.torque; },
           "The STO signal: may the motors have torque?")
       .def_prop_ro(
-          "state", [](const GuardOutput& o) { return choice_name(o.safety.state, kStates); },
+          "state", [](const GuardOutput& o) { return std::string(choice_name(o.safety.state)); },
           "'off', 'on', 'stopping'.")
       .def_prop_ro(
           "violated", [](const GuardOutput& o) { return violated(o.safety); },

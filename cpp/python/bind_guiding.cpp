@@ -1,3 +1,4 @@
+#include "bind_fields.hpp"
 #include "proxcgal/guiding/hand_guide.hpp"
 #include "robot_arguments.hpp"
 #include "topics.hpp"
@@ -9,48 +10,35 @@ Vector6 vector6_from(nb::handle value, const char* name, Take take = Take::kConv
   return vector_from(value, name, 6, take, false);
 }
 
+/// From the robot and the fields of the config.
+template <std::size_t... kAt>
+void bind_constructor(nb::class_<HandGuide>& guide, std::index_sequence<kAt...> all) {
+  const std::vector<std::string> names = field_names<HandGuideConfig>();
+  guide.def(
+      "__init__",
+      [all](HandGuide* self, std::shared_ptr<const Robot> robot,
+            typename FieldAt<HandGuideConfig, kAt>::Parameter... values) {
+        new (self) HandGuide(
+            std::move(robot),
+            config_from<HandGuideConfig>(
+                all, false,
+                std::forward<typename FieldAt<HandGuideConfig, kAt>::Parameter>(values)...));
+      },
+      "robot"_a, nb::kw_only(), FieldAt<HandGuideConfig, kAt>::argument(names)...,
+      "Args: qd_max, qdd_max (n,) of the commands, None for the robot's own; period [s].\n"
+      "Raises: ConfigError with field, value and what is allowed.");
+}
+
 }  // namespace
 
 void bind_guiding(nb::module_& m) {
-  const AdmittanceConfig fresh;
-  nb::class_<AdmittanceConfig>(m, "AdmittanceConfig",
-                               "M a + D v = F: three linear and three angular axes, in world.")
-      .def(
-          "__init__",
-          [](AdmittanceConfig* self, nb::handle mass, nb::handle damping, nb::handle dead_band,
-             nb::handle max_force, double engage_time) {
-            AdmittanceConfig config;
-            const auto take = [](nb::handle value, const char* name, Vector6& field) {
-              if (!value.is_none()) field = vector6_from(value, name);
-            };
-            take(mass, "mass", config.mass);
-            take(damping, "damping", config.damping);
-            take(dead_band, "dead_band", config.dead_band);
-            take(max_force, "max_force", config.max_force);
-            config.engage_time = engage_time;
-            config.validate();
-            new (self) AdmittanceConfig(config);
-          },
-          nb::kw_only(), "mass"_a = nb::none(), "damping"_a = nb::none(),
-          "dead_band"_a = nb::none(), "max_force"_a = nb::none(),
-          "engage_time"_a = fresh.engage_time,
-          "Args: six numbers each, None for the defaults.\nRaises: ConfigError with field, value "
-          "and bound.")
-      .def_prop_ro(
-          "mass", [](const AdmittanceConfig& c) { return Vector6(c.mass); }, "(6,) [kg], [kg m^2]")
-      .def_prop_ro(
-          "damping", [](const AdmittanceConfig& c) { return Vector6(c.damping); },
-          "(6,) [N s/m], [N m s/rad]")
-      .def_prop_ro(
-          "dead_band", [](const AdmittanceConfig& c) { return Vector6(c.dead_band); },
-          "(6,) [N], [N m]")
-      .def_prop_ro(
-          "max_force", [](const AdmittanceConfig& c) { return Vector6(c.max_force); },
-          "(6,) [N], [N m]")
-      .def_ro("engage_time", &AdmittanceConfig::engage_time, "[s]");
+  bind_fields<AdmittanceConfig>(
+      m,
+      "Args: six numbers each, None for the defaults.\nRaises: ConfigError with field, value and "
+      "what is allowed.");
   nb::class_<Admittance>(m, "Admittance",
                          "The tool as a mass in a viscous medium that the hand pushes; passive.")
-      .def(nb::init<const AdmittanceConfig&>(), "config"_a = fresh)
+      .def(nb::init<const AdmittanceConfig&>(), "config"_a = AdmittanceConfig{})
       .def(
           "step",
           [](Admittance& a, nb::handle force, bool engaged, double dt) {
@@ -82,22 +70,12 @@ void bind_guiding(nb::module_& m) {
           "(6,) twist by the command.")
       .def_prop_ro(
           "T_WT", [](const HandGuideOutput& o) { return to_matrix(o.T_WT); }, "(4, 4)");
-  nb::class_<HandGuide>(m, "HandGuide",
-                        "From the force at the handle to joint velocities: admittance, "
-                        "task-priority solver, limits.")
-      .def(
-          "__init__",
-          [](HandGuide* self, std::shared_ptr<const Robot> robot,
-             const AdmittanceConfig& admittance, const SolverConfig& solver, nb::handle qd_max,
-             nb::handle qdd_max, double period) {
-            new (self) HandGuide(std::move(robot),
-                                 {admittance, solver, joints_from(qd_max, "qd_max", false),
-                                  joints_from(qdd_max, "qdd_max", false), period});
-          },
-          "robot"_a, nb::kw_only(), "admittance"_a = fresh, "solver"_a = SolverConfig{},
-          "qd_max"_a = nb::none(), "qdd_max"_a = nb::none(), "period"_a = HandGuideConfig{}.period,
-          "Args: qd_max, qdd_max (n,) of the commands, None for the robot's own; period [s].\n"
-          "Raises: ConfigError with field, value and bound.")
+  nb::class_<HandGuide> guide(m, "HandGuide",
+                              "From the force at the handle to joint velocities: admittance, "
+                              "task-priority solver, limits.");
+  register_table<HandGuideConfig>();
+  bind_constructor(guide, EveryField<HandGuideConfig>{});
+  guide
       .def(
           "step",
           [](HandGuide& g, nb::handle q, nb::handle force, bool engaged) -> const HandGuideOutput& {

@@ -36,7 +36,7 @@ nb::object remove_body_all(const Robot& robot, nb::handle q, nb::handle origins,
   for (const double value : per_point)
     require(std::isfinite(value) && value >= 0.0, "tolerance", value, "finite, 0 m or more");
   require(std::isfinite(min_hit) && min_hit >= 0.0, "min_hit", min_hit, "finite, 0 m or more");
-  const Method how = choice(method, "method", kMethods);
+  const Method how = choice_of<Method>(method, "method");
   const Posture posture = posture_at(robot, q);
   auto* keep = new bool[static_cast<std::size_t>(n)];
   std::fill_n(keep, n, true);
@@ -56,7 +56,7 @@ NamedPair closest_pair_all(const Robot& robot, nb::handle q, nb::handle points,
                            const std::string& method, std::optional<std::int64_t> steps) {
   const PointsArgument points_W(points, "points_W");
   require_rows(points_W(), "points_W");
-  const Method how = choice(method, "method", kMethods);
+  const Method how = choice_of<Method>(method, "method");
   const Posture posture = posture_at(robot, q);
   if (steps) require(*steps >= 0, "steps", *steps, "0 or more, or None");
   const nb::gil_scoped_release release;

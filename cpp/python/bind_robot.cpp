@@ -10,9 +10,6 @@
 namespace proxcgal::binding {
 namespace {
 
-constexpr std::pair<const char*, JointType> kJointTypes[] = {{"revolute", JointType::kRevolute},
-                                                             {"prismatic", JointType::kPrismatic}};
-
 template <class Specs>
 std::vector<std::string> names_of(const Specs& specs) {
   std::vector<std::string> names;
@@ -40,7 +37,7 @@ void bind_robot(nb::module_& m) {
              nb::handle origin, nb::handle axis, double q_min, double q_max, double qd_max,
              double qdd_max) {
             new (self) JointSpec{std::move(name),
-                                 choice(type, "type", kJointTypes),
+                                 choice_of<JointType>(type, "type"),
                                  parent,
                                  pose_from(origin, "origin"),
                                  vector3_from(axis, "axis"),

@@ -2,15 +2,12 @@
 
 #include <algorithm>
 
-#include "convert.hpp"
+#include "bind_fields.hpp"
 #include "proxcgal/pipeline/sense.hpp"
 #include "topics.hpp"
 
 namespace proxcgal::binding {
 namespace {
-
-constexpr std::pair<const char*, RangeModel> kRangeModels[] = {{"tangent", RangeModel::kTangent},
-                                                               {"printed", RangeModel::kPrinted}};
 
 Points zone_directions(const SensorModel& model) {
   const Sense sense(model);
@@ -94,39 +91,7 @@ void bind_sense(nb::module_& m) {
                                                                                  kZones));
           },
           "(64,) target status, 5 is valid.");
-  nb::class_<SensorModel>(
-      m, "SensorModel",
-      "Model of one VL53L8CX-like sensor: 8 x 8 zones, distance along its z axis. SI units.")
-      .def(
-          "__init__",
-          [](SensorModel* self, double field_of_view, double min_range, double max_range,
-             double workspace, double sigma_floor, double sigma_ratio,
-             const std::string& range_model) {
-            const SensorModel model{field_of_view,
-                                    min_range,
-                                    max_range,
-                                    workspace,
-                                    sigma_floor,
-                                    sigma_ratio,
-                                    choice(range_model, "range_model", kRangeModels)};
-            model.validate();
-            new (self) SensorModel(model);
-          },
-          nb::kw_only(), "field_of_view"_a = SensorModel{}.field_of_view,
-          "min_range"_a = SensorModel{}.min_range, "max_range"_a = SensorModel{}.max_range,
-          "workspace"_a = SensorModel{}.workspace, "sigma_floor"_a = SensorModel{}.sigma_floor,
-          "sigma_ratio"_a = SensorModel{}.sigma_ratio, "range_model"_a = "tangent")
-      .def_ro("field_of_view", &SensorModel::field_of_view, "[rad] along one side.")
-      .def_ro("min_range", &SensorModel::min_range, "[m].")
-      .def_ro("max_range", &SensorModel::max_range, "[m].")
-      .def_ro("workspace", &SensorModel::workspace,
-              "[m] along the ray; farther points are cropped.")
-      .def_ro("sigma_floor", &SensorModel::sigma_floor, "[m] least standard deviation of a range.")
-      .def_ro("sigma_ratio", &SensorModel::sigma_ratio, "[-] of the range, where that is more.")
-      .def_prop_ro(
-          "range_model",
-          [](const SensorModel& s) { return choice_name(s.range_model, kRangeModels); },
-          "'tangent', or 'printed' as [WA] eq. (1) has it.")
+  bind_fields<SensorModel>(m)
       .def("sigma", &SensorModel::sigma, "range"_a, "Standard deviation of a range [m].")
       .def(
           "__eq__",

@@ -1,3 +1,4 @@
+#include "bind_fields.hpp"
 #include "proxcgal/pipeline/solve.hpp"
 #include "stack_arguments.hpp"
 #include "topics.hpp"
@@ -5,8 +6,6 @@
 namespace proxcgal::binding {
 namespace {
 
-constexpr std::pair<const char*, Damping> kForms[] = {{"literal", Damping::kLiteral},
-                                                      {"code", Damping::kCode}};
 using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 void require_at_most(std::size_t count, int limit, const std::string& what) {
@@ -39,7 +38,7 @@ Solution solve_tasks(const std::vector<Task>& tasks, nb::handle qd_max,
   require_at_most(tasks.size(), kMaxLevels, "tasks");
   const Eigen::Index n = tasks.front().jacobian.cols();
   require_joints(tasks, n);
-  config.validate();
+  validate(config);
   JointVector limit;
   if (!qd_max.is_none()) limit = limits_from(qd_max, "qd_max", n, 0.0, "at least 0");
   Solution out;
@@ -73,30 +72,7 @@ void bind_solve(nb::module_& m) {
       .def_prop_ro(
           "activation", [](const Task& t) { return Eigen::VectorXd(t.activation); },
           "(m,) in [0, 1].");
-  nb::class_<SolverConfig>(m, "SolverConfig",
-                           "Constants of the regularised pseudo-inverse. Source: thesis eq. (4.7).")
-      .def(
-          "__init__",
-          [](SolverConfig* self, double damping, double damping_threshold, double eta,
-             const std::string& form) {
-            const SolverConfig config{damping, damping_threshold, eta,
-                                      choice(form, "SolverConfig.form", kForms)};
-            config.validate();
-            new (self) SolverConfig(config);
-          },
-          nb::kw_only(), "damping"_a = SolverConfig{}.damping,
-          "damping_threshold"_a = SolverConfig{}.damping_threshold, "eta"_a = SolverConfig{}.eta,
-          "form"_a = "literal", "Raises: ConfigError with field, value and bound.")
-      .def_rw("damping", &SolverConfig::damping, "lambda, the most that is added to an eigenvalue.")
-      .def_rw("damping_threshold", &SolverConfig::damping_threshold,
-              "s_th, eigenvalues up to it are damped.")
-      .def_rw("eta", &SolverConfig::eta, "Cost of leaving the freedom that upper levels left.")
-      .def_prop_rw(
-          "form", [](const SolverConfig& c) { return choice_name(c.form, kForms); },
-          [](SolverConfig& c, const std::string& form) {
-            c.form = choice(form, "SolverConfig.form", kForms);
-          },
-          "'literal': 1 / (s + p), eq. (4.7); 'code': s / (s^2 + p), as its authors' code has it.");
+  bind_fields<SolverConfig, Access::kReadWrite>(m);
   nb::class_<Solution>(m, "Solution", "Joint velocities after each level [rad/s] or [m/s].")
       .def_prop_ro(
           "qd", [](const Solution& s) { return Eigen::VectorXd(s.qd()); },

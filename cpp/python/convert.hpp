@@ -218,24 +218,4 @@ inline Eigen::Matrix<double, 4, 4, Eigen::RowMajor> to_matrix(const Pose& pose) 
   return pose.matrix();
 }
 
-/// One of several names, or a ConfigError that lists them.
-template <class Enum, std::size_t N>
-Enum choice(const std::string& value, const char* name,
-            const std::pair<const char*, Enum> (&choices)[N]) {
-  std::string names;
-  for (const auto& [text, result] : choices) {
-    if (value == text) return result;
-    names += std::string(names.empty() ? "" : ", ") + "'" + text + "'";
-  }
-  throw ConfigError(std::string(name) + " is '" + value + "', allowed are " + names);
-}
-
-template <class Enum, std::size_t N>
-std::string choice_name(Enum value, const std::pair<const char*, Enum> (&choices)[N]) {
-  for (const auto& [text, result] : choices) {
-    if (result == value) return text;
-  }
-  return "";
-}
-
 }  // namespace proxcgal::binding

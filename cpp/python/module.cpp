@@ -1,5 +1,6 @@
 #include <nanobind/nanobind.h>
 
+#include "bind_fields.hpp"
 #include "proxcgal/error.hpp"
 #include "topics.hpp"
 
@@ -46,4 +47,5 @@ NB_MODULE(_core, m) {
   bind_controller(m);
   bind_guard(m);
   bind_guiding(m);
+  bind_field_tables(m);
 }

@@ -18,7 +18,4 @@ inline NamedPair named(const Robot& robot, const ClosestPair& pair) {
   return {pair, pair.link < 0 ? "" : robot.spec().links[static_cast<std::size_t>(pair.link)].name};
 }
 
-inline constexpr std::pair<const char*, Method> kMethods[] = {{"fast", Method::kFast},
-                                                              {"paper", Method::kPaper}};
-
 }  // namespace proxcgal::binding

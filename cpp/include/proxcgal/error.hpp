@@ -2,6 +2,7 @@
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 namespace proxcgal {
 
@@ -32,7 +33,7 @@ class GeometryError : public ProxError {
 /// A setting's bound, checked at set-up.
 /// @throws ConfigError  naming the field, its value and what it must be
 template <class Value>
-void require(bool good, const char* field, const Value& value, const std::string& bound) {
+void require(bool good, std::string_view field, const Value& value, const std::string& bound) {
   if (good) return;
   std::ostringstream message;
   message << field << " is " << value << ", must be " << bound;

@@ -1,14 +1,19 @@
 #pragma once
+#include <array>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "proxcgal/fields.hpp"
 #include "proxcgal/geometry/mesh_tree.hpp"
 #include "proxcgal/types.hpp"
 
 namespace proxcgal {
 
 enum class JointType : std::uint8_t { kRevolute, kPrismatic };
+template <>
+inline constexpr auto choices<JointType> = std::array{Choice{"revolute", JointType::kRevolute},
+                                                      Choice{"prismatic", JointType::kPrismatic}};
 
 /// One moving joint. Fixed joints are folded into `origin` by whoever reads the description.
 struct JointSpec {

@@ -8,6 +8,7 @@
 #include "obstacle_velocities.hpp"
 #include "proxcgal/control/controller_config.hpp"
 #include "proxcgal/pipeline/distance.hpp"
+#include "proxcgal/pipeline/task.hpp"
 #include "proxcgal/robot.hpp"
 
 namespace proxcgal::detail {

@@ -58,8 +58,12 @@ struct Controller::Impl {
         config(std::move(c)),
         monitor(config.monitor),
         perception(robot, skin,
-                   {config.filter, config.monitor, config.method, config.memory, config.motion,
-                    config.timings}),
+                   {.filter = config.filter,
+                    .monitor = config.monitor,
+                    .method = config.method,
+                    .memory = config.memory,
+                    .motion = config.motion,
+                    .timings = config.timings}),
         control_points(*robot, skin, config),
         stack(*robot, skin, config),
         trusted(*robot, config),
@@ -196,7 +200,7 @@ struct Controller::Impl {
 };
 
 Controller::Controller(std::shared_ptr<const Robot> robot, Skin skin, ControllerConfig config) {
-  config.validate();
+  validate(config);
   impl_ = std::make_unique<Impl>(std::move(robot), std::move(skin), std::move(config));
 }
 Controller::~Controller() = default;

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "proxcgal/control/controller_config.hpp"
+#include "proxcgal/pipeline/task.hpp"
 #include "proxcgal/robot.hpp"
 
 namespace proxcgal::detail {

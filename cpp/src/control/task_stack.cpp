@@ -136,7 +136,7 @@ ControllerConfig retuned(const ControllerConfig& config, const std::vector<TaskS
   }
   ControllerConfig changed = config;
   changed.tasks = tasks;
-  changed.validate();
+  validate(changed);
   for (const TaskSpec& task : tasks) validate(task, robot);
   return changed;
 }

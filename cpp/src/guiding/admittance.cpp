@@ -3,12 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "proxcgal/error.hpp"
-
 namespace proxcgal {
 namespace {
-
-bool positive(const Vector6& values) { return values.allFinite() && values.minCoeff() > 0.0; }
 
 /// One axis over a time without a change of sign: its velocity at the end, and its way.
 struct Piece {
@@ -30,19 +26,7 @@ double time_to_rest(double mass, double damping, double force, double velocity) 
 
 }  // namespace
 
-void AdmittanceConfig::validate() const {
-  require(positive(mass), "admittance.mass", mass.transpose(), "above 0 kg or kg m^2, six numbers");
-  require(positive(damping), "admittance.damping", damping.transpose(),
-          "above 0 N s/m or N m s/rad, six numbers");
-  require(dead_band.allFinite() && dead_band.minCoeff() >= 0.0, "admittance.dead_band",
-          dead_band.transpose(), "0 N or N m or more, six numbers");
-  require(positive(max_force), "admittance.max_force", max_force.transpose(),
-          "above 0 N or N m, six numbers");
-  require(std::isfinite(engage_time) && engage_time >= 0.0, "admittance.engage_time", engage_time,
-          "0 s or more");
-}
-
-Admittance::Admittance(const AdmittanceConfig& config) : config_(config) { config.validate(); }
+Admittance::Admittance(const AdmittanceConfig& config) : config_(config) { validate(config); }
 
 const Vector6& Admittance::step(const Vector6& force, bool engaged, double dt) {
   const double ramp = config_.engage_time > 0.0 ? dt / config_.engage_time : 1.0;

@@ -1,6 +1,5 @@
 #include "proxcgal/guiding/hand_guide.hpp"
 
-#include <cmath>
 #include <string>
 #include <utility>
 
@@ -12,26 +11,23 @@ namespace {
 constexpr double kHeldBack =
     1e-9;  ///< [m/s], [rad/s] a smaller difference is the solver's rounding
 
-void require_limits(const JointVector& values, Eigen::Index n, const char* field) {
-  if (values.size() == 0) return;
-  require(values.size() == n && !values.hasNaN() && values.minCoeff() > 0.0, field,
-          values.transpose(), std::to_string(n) + " numbers above 0, one a joint");
+void require_joints(const JointVector& values, Eigen::Index n, const char* field) {
+  require(values.size() == 0 || values.size() == n, field, values.transpose(),
+          std::to_string(n) + " numbers above 0, one a joint");
+}
+
+HandGuideConfig checked(HandGuideConfig config, const Robot& robot) {
+  validate(config);
+  require_joints(config.qd_max, robot.n_q(), "qd_max");
+  require_joints(config.qdd_max, robot.n_q(), "qdd_max");
+  return config;
 }
 
 }  // namespace
 
-void HandGuideConfig::validate(const Robot& robot) const {
-  admittance.validate();
-  solver.validate();
-  require_limits(qd_max, robot.n_q(), "qd_max");
-  require_limits(qdd_max, robot.n_q(), "qdd_max");
-  require(std::isfinite(period) && period > 0.0 && period <= 0.1, "period", period,
-          "above 0 and at most 0.1 s");
-}
-
 HandGuide::HandGuide(std::shared_ptr<const Robot> robot, HandGuideConfig config)
     : robot_(std::move(robot)),
-      config_((config.validate(*robot_), std::move(config))),
+      config_(checked(std::move(config), *robot_)),
       admittance_(config_.admittance),
       limits_{robot_->q_min(), robot_->q_max(),
               config_.qd_max.size() > 0 ? config_.qd_max : robot_->qd_max(),

@@ -1,13 +1,11 @@
 #include "proxcgal/perception/memory.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <vector>
 
 #include "geometry/frames.hpp"
 #include "geometry/point_chunk.hpp"
 #include "geometry/voxel_index.hpp"
-#include "proxcgal/error.hpp"
 #include "sight_lines.hpp"
 
 namespace proxcgal {
@@ -17,17 +15,6 @@ constexpr std::int64_t kPairsAView = 64;    // that a scan costs whatever there 
 constexpr std::int64_t kPairsATick = 8192;  // (point, scan) that one tick looks at
 
 }  // namespace
-
-void MemoryConfig::validate() const {
-  require(std::isfinite(memory_s) && memory_s >= 0.0, "memory.memory_s", memory_s,
-          "finite and 0 s or more");
-  require(voxel >= 0.005 && voxel <= 0.5, "memory.voxel", voxel, "between 0.005 and 0.5 m");
-  // The one held, the nearest, and one that comes.
-  require(max_points >= 3 && max_points <= 65536, "memory.max_points", max_points,
-          "between 3 and 65536");
-  require(clear_scans >= 1 && clear_scans <= 100, "memory.clear_scans", clear_scans,
-          "between 1 and 100");
-}
 
 struct Memory::Impl {
   MemoryConfig config;

@@ -6,8 +6,6 @@
 #include <cmath>
 #include <vector>
 
-#include "proxcgal/error.hpp"
-
 namespace proxcgal {
 namespace {
 
@@ -38,15 +36,6 @@ double widened(double deviations, double free) {
 }
 
 }  // namespace
-
-void MotionConfig::validate() const {
-  require(window > 0.0 && window <= 1.0, "motion.window", window, "above 0 and at most 1 s");
-  require(radius > 0.0 && radius <= 1.0, "motion.radius", radius, "above 0 and at most 1 m");
-  require(std::isfinite(confidence) && confidence >= 0.0, "motion.confidence", confidence,
-          "finite and 0 or more");
-  require(std::isfinite(max_speed) && max_speed >= 0.0, "motion.max_speed", max_speed,
-          "finite and 0 m/s or more");
-}
 
 struct Motion::Impl {
   MotionConfig config;

@@ -45,7 +45,10 @@ Perception::Perception(std::shared_ptr<const Robot> robot, const Skin& skin,
   std::size_t remembered = 0;
   if (config.memory && config.memory->memory_s > 0.0) {
     const SensorModel& model = skin.model;
-    const ViewModel view{model.field_of_view, model.sigma_floor, model.sigma_ratio, config_.sigmas};
+    const ViewModel view{.field_of_view = model.field_of_view,
+                         .sigma_floor = model.sigma_floor,
+                         .sigma_ratio = model.sigma_ratio,
+                         .sigmas = config_.sigmas};
     memory_.emplace(*config.memory, view, sensors_.size());
     remembered = static_cast<std::size_t>(config.memory->max_points);
     body_ = std::make_unique<bool[]>(remembered);

@@ -6,7 +6,6 @@
 
 #include "geometry/frames.hpp"
 #include "geometry/point_chunk.hpp"
-#include "proxcgal/error.hpp"
 
 namespace proxcgal {
 namespace {
@@ -86,15 +85,6 @@ void remove_body_fast(const Robot& robot, const Posture& posture, const PointsRe
 }
 
 }  // namespace
-
-void FilterConfig::validate() const {
-  require(std::isfinite(tolerance) && tolerance >= 0.0, "filter.tolerance", tolerance,
-          "0 m or more");
-  require(std::isfinite(sigmas) && sigmas >= 0.0, "filter.sigmas", sigmas, "0 or more");
-  require(std::isfinite(min_hit) && min_hit >= 0.0, "filter.min_hit", min_hit, "0 m or more");
-  require(!std::isnan(z_min) && z_min < kInfinity, "filter.z_min", z_min,
-          "a height [m], -inf for no crop");
-}
 
 void remove_body(const Robot& robot, const Posture& posture, const PointsRef& origins_W,
                  const PointsRef& points_W, std::span<const double> tolerance, double min_hit,

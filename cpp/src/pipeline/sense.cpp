@@ -20,23 +20,16 @@ double zone_angle(int index, double field_of_view) {
 
 }  // namespace
 
-void SensorModel::validate() const {
-  require(field_of_view > 0.0 && field_of_view < 3.0, "field_of_view", field_of_view,
-          "above 0 and below 3 rad");
-  require(min_range >= 0.0, "min_range", min_range, "0 m or more");
-  require(std::isfinite(max_range) && max_range > min_range, "max_range", max_range,
-          "above min_range [m]");
-  require(workspace > 0.0, "workspace", workspace, "above 0 m");
-  require(std::isfinite(sigma_floor) && sigma_floor >= 0.0, "sigma_floor", sigma_floor,
-          "0 m or more");
-  require(std::isfinite(sigma_ratio) && sigma_ratio >= 0.0, "sigma_ratio", sigma_ratio,
-          "0 or more");
+void check(const SensorModel& model, const std::string& path) {
+  require(model.max_range > model.min_range, path + "max_range",
+          detail::with_unit(model.max_range, "m"),
+          "above min_range = " + detail::with_unit(model.min_range, "m"));
 }
 
 double SensorModel::sigma(double range) const { return std::max(sigma_floor, sigma_ratio * range); }
 
 Sense::Sense(const SensorModel& model) : model_(model) {
-  model.validate();
+  validate(model);
   for (int zone = 0; zone < kZones; ++zone) {
     const double alpha = zone_angle(zone % kSide, model.field_of_view);
     const double beta = zone_angle(zone / kSide, model.field_of_view);

@@ -7,7 +7,6 @@
 #include <numbers>
 
 #include "geometry/velocity_box.hpp"
-#include "proxcgal/error.hpp"
 
 namespace proxcgal {
 namespace {
@@ -177,15 +176,6 @@ bool add(Level& level, bool closing, const SolverConfig& config, const JointVect
 }
 
 }  // namespace
-
-void SolverConfig::validate() const {
-  const auto finite = [](double value) { return std::isfinite(value); };
-  require(finite(damping) && damping >= 0.0, "SolverConfig.damping", damping,
-          "finite and at least 0");
-  require(finite(damping_threshold) && damping_threshold > 0.0, "SolverConfig.damping_threshold",
-          damping_threshold, "finite and above 0");
-  require(finite(eta) && eta >= 0.0, "SolverConfig.eta", eta, "finite and at least 0");
-}
 
 void solve(std::span<const Task> tasks, int n, const JointVector& qd_max,
            const SolverConfig& config, Solution& out) {

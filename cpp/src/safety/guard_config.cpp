@@ -117,6 +117,7 @@ void add_pairs(const Robot& robot, const Separation& separation,
 }  // namespace
 
 std::vector<Contradiction> contradictions(const Robot& robot, const GuardConfig& config) {
+  validate(config);
   const Eigen::Index n = robot.n_q();
   require_joints(config.q_reference, n, "q_reference");
   require((config.q_reference.array() >= robot.q_min().array()).all() &&

@@ -43,20 +43,18 @@ SafetyLimits basic_limits(const Robot& robot, const JointVector& q, double tcp_s
   return limits;
 }
 
+void check(const SafetyTiming& timing, const std::string& path) {
+  require(timing.max_gap >= timing.period, path + "max_gap", detail::with_unit(timing.max_gap, "s"),
+          "at least the period of " + detail::with_unit(timing.period, "s"));
+}
+
 SafetyLogic::SafetyLogic(SafetyLimits limits, SafetyTiming timing)
     : limits_(std::move(limits)), timing_(timing) {
   require(limits_.tcp_speed > 0.0, "tcp_speed", limits_.tcp_speed, "above 0 m/s");
   require(positive(limits_.qd), "joint speed bounds", limits_.qd.transpose(), "above 0 rad/s");
   require(positive(limits_.qdd) && limits_.qdd.size() == limits_.qd.size(),
           "joint acceleration bounds", limits_.qdd.transpose(), "above 0 rad/s^2, one a joint");
-  require(timing_.stop_time > 0.0 && std::isfinite(timing_.stop_time), "stop_time",
-          timing_.stop_time, "above 0 s");
-  require(timing_.rest_speed > 0.0 && std::isfinite(timing_.rest_speed), "rest_speed",
-          timing_.rest_speed, "above 0 rad/s");
-  require(timing_.period > 0.0 && std::isfinite(timing_.period), "period", timing_.period,
-          "above 0 s");
-  require(timing_.max_gap >= timing_.period && std::isfinite(timing_.max_gap), "max_gap",
-          timing_.max_gap, "at least the period [s]");
+  validate(timing_);
   qd_last_.setZero(limits_.qd.size());
 }
 

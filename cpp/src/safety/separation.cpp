@@ -42,24 +42,18 @@ void check(const std::vector<LinkCapsule>& capsules, const Robot& robot) {
   }
 }
 
-void check(const SeparationConfig& config, double stop_time) {
-  require(positive(config.human.radius), "human.radius", config.human.radius, "above 0 m");
-  require(std::isfinite(config.human.height) && config.human.height >= 2.0 * config.human.radius,
-          "human.height", config.human.height, "at least twice the radius [m]");
-  require(config.human.offset_T.allFinite(), "human.offset", "not finite", "finite [m]");
-  require(not_negative(config.min_distance), "min_distance", config.min_distance, "0 m or more");
-  require(positive(config.max_velocity), "max_velocity", config.max_velocity, "above 0 m/s");
-  require(positive(stop_time), "stop_time", stop_time, "above 0 s");
-  config.iso.validate();
-}
-
 }  // namespace
 
-void IsoSeparation::validate() const {
-  require(not_negative(human_speed), "iso.human_speed", human_speed, "0 m/s or more");
-  require(not_negative(reaction_time), "iso.reaction_time", reaction_time, "0 s or more");
-  const double lengths = intrusion + human_uncertainty + robot_uncertainty;
-  require(not_negative(lengths), "iso: intrusion and uncertainties", lengths, "0 m or more");
+void check(const OperatorCapsule& config, const std::string& path) {
+  require(config.height >= 2.0 * config.radius, path + "height",
+          detail::with_unit(config.height, "m"),
+          "at least twice the radius of " + detail::with_unit(config.radius, "m"));
+}
+
+void check(const IsoSeparation& iso, const std::string& path) {
+  const double sum = iso.intrusion + iso.human_uncertainty + iso.robot_uncertainty;
+  require(sum >= 0.0, path + "intrusion + human_uncertainty + robot_uncertainty",
+          detail::with_unit(sum, "m"), "at least 0 m");
 }
 
 Capsule OperatorCapsule::at(const Pose& T_WT) const {
@@ -78,7 +72,8 @@ Separation::Separation(const Robot& robot, std::vector<LinkCapsule> capsules,
                        SeparationConfig config, double stop_time)
     : capsules_(std::move(capsules)), config_(std::move(config)), stop_time_(stop_time) {
   check(capsules_, robot);
-  check(config_, stop_time_);
+  validate(config_);
+  require(positive(stop_time), "stop_time", detail::with_unit(stop_time, "s"), above(0).text("s"));
   pairs_ = rows_of(config_.pairs, capsules_, "separation.pairs");
   ends_ = rows_of(config_.ends, capsules_, "separation.ends");
 }

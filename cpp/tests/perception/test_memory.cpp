@@ -331,13 +331,13 @@ TEST_F(Remembering, TheHeldPointOutlivesAnyCrowd) {
 }
 
 TEST(MemoryConfig, RefusesWhatCannotBe) {
-  EXPECT_THROW(MemoryConfig{.memory_s = -1.0}.validate(), ConfigError);
-  EXPECT_THROW(MemoryConfig{.memory_s = kInfinity}.validate(), ConfigError);
-  EXPECT_THROW(MemoryConfig{.voxel = 0.0}.validate(), ConfigError);
-  EXPECT_THROW(MemoryConfig{.max_points = 2}.validate(), ConfigError);
-  EXPECT_THROW(MemoryConfig{.clear_scans = 0}.validate(), ConfigError);
-  EXPECT_THROW(MotionConfig{.window = 0.0}.validate(), ConfigError);
-  EXPECT_THROW(MotionConfig{.radius = kInfinity}.validate(), ConfigError);
+  EXPECT_THROW(validate(MemoryConfig{.memory_s = -1.0}), ConfigError);
+  EXPECT_THROW(validate(MemoryConfig{.memory_s = kInfinity}), ConfigError);
+  EXPECT_THROW(validate(MemoryConfig{.voxel = 0.0}), ConfigError);
+  EXPECT_THROW(validate(MemoryConfig{.max_points = 2}), ConfigError);
+  EXPECT_THROW(validate(MemoryConfig{.clear_scans = 0}), ConfigError);
+  EXPECT_THROW(validate(MotionConfig{.window = 0.0}), ConfigError);
+  EXPECT_THROW(validate(MotionConfig{.radius = kInfinity}), ConfigError);
 }
 
 TEST(VoxelIndex, FindsWhatAMapFinds) {

@@ -191,10 +191,10 @@ TEST(SolverConfig, NamesTheFieldItsValueAndItsBound) {
   for (const SolverConfig& bad :
        {SolverConfig{.damping = -1.0}, SolverConfig{.damping_threshold = 0.0},
         SolverConfig{.eta = std::nan("")}}) {
-    EXPECT_THROW(bad.validate(), ConfigError);
+    EXPECT_THROW(validate(bad), ConfigError);
   }
   try {
-    SolverConfig{.damping = -1e-9}.validate();
+    validate(SolverConfig{.damping = -1e-9});
     FAIL();
   } catch (const ConfigError& error) {
     EXPECT_STREQ(error.what(), "SolverConfig.damping is -1e-09, must be finite and at least 0");

@@ -238,7 +238,7 @@ TEST(TaskSpec, NamesTheFieldItsValueAndItsBound) {
     validate(TaskSpec{Avoidance{.d_min = -0.25}});
     FAIL();
   } catch (const ConfigError& error) {
-    EXPECT_STREQ(error.what(), "Avoidance.d_min is -0.25, must be finite and at least 0 m");
+    EXPECT_STREQ(error.what(), "Avoidance.d_min is -0.25 m, must be finite and at least 0 m");
   }
 }
 

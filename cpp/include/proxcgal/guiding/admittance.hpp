@@ -1,6 +1,7 @@
 #pragma once
 #include <array>
 
+#include "proxcgal/fields.hpp"
 #include "proxcgal/types.hpp"
 
 namespace proxcgal {
@@ -9,15 +10,24 @@ using Vector6 = Eigen::Matrix<double, 6, 1>;  ///< linear first, then angular
 
 /// M a + D v = F, axis by axis: the linear ones and the angular ones, in world.
 struct AdmittanceConfig {
-  Vector6 mass = (Vector6() << 8, 8, 8, 0.3, 0.3, 0.3).finished();       ///< [kg], [kg m^2]
-  Vector6 damping = (Vector6() << 35, 35, 35, 2, 2, 2).finished();       ///< [N s/m], [N m s/rad]
-  Vector6 dead_band = (Vector6() << 2, 2, 2, 0.2, 0.2, 0.2).finished();  ///< [N], [N m]
-  Vector6 max_force = (Vector6() << 150, 150, 150, 20, 20, 20).finished();  ///< [N], [N m]
-  double engage_time = 0.3;  ///< [s] in which the hand is let in, and let go
-
-  /// @throws ConfigError  with the field, its value and its bounds
-  void validate() const;
+  Vector6 mass = (Vector6() << 8, 8, 8, 0.3, 0.3, 0.3).finished();
+  Vector6 damping = (Vector6() << 35, 35, 35, 2, 2, 2).finished();
+  Vector6 dead_band = (Vector6() << 2, 2, 2, 0.2, 0.2, 0.2).finished();
+  Vector6 max_force = (Vector6() << 150, 150, 150, 20, 20, 20).finished();
+  double engage_time = 0.3;
 };
+
+template <>
+inline constexpr auto fields<AdmittanceConfig> = field_table(
+    "AdmittanceConfig", "M a + D v = F: three linear and three angular axes, in world.",
+    field(&AdmittanceConfig::mass, "mass", "kg, kg m^2", above(0), "M of each axis."),
+    field(&AdmittanceConfig::damping, "damping", "N s/m, N m s/rad", above(0), "D of each axis."),
+    field(&AdmittanceConfig::dead_band, "dead_band", "N, N m", at_least(0),
+          "Force on each axis below which the hand drives nothing."),
+    field(&AdmittanceConfig::max_force, "max_force", "N, N m", above(0),
+          "Largest driving force on each axis."),
+    field(&AdmittanceConfig::engage_time, "engage_time", "s", at_least(0),
+          "Ramp in which the hand is let in, and let go."));
 
 /// Hand guiding: the tool moves like a mass in a viscous medium that the hand pushes.
 ///

@@ -11,12 +11,20 @@ namespace proxcgal {
 struct HandGuideConfig {
   AdmittanceConfig admittance;
   SolverConfig solver;
-  JointVector qd_max, qdd_max;  ///< (n,) of the commands; empty: the robot's own
-  double period = 0.001;        ///< [s]
-
-  /// @throws ConfigError  with the field, its value and its bounds
-  void validate(const Robot& robot) const;
+  JointVector qd_max, qdd_max;
+  double period = 0.001;
 };
+
+template <>
+inline constexpr auto fields<HandGuideConfig> = field_table(
+    "HandGuideConfig", "Set-up of hand guiding.",
+    field(&HandGuideConfig::admittance, "admittance", "Mass and damping that the hand feels."),
+    field(&HandGuideConfig::solver, "solver", "Constants of the pseudo-inverse."),
+    field(&HandGuideConfig::qd_max, "qd_max", "rad/s or m/s", above(0).or_infinite(),
+          "Speed limits of the commands, one a joint; empty: the robot's own."),
+    field(&HandGuideConfig::qdd_max, "qdd_max", "rad/s^2 or m/s^2", above(0).or_infinite(),
+          "Acceleration limits of the commands, one a joint; empty: the robot's own."),
+    field(&HandGuideConfig::period, "period", "s", above(0).at_most(0.1), "Period of the cycle."));
 
 /// What one cycle gave. Twists: linear first, of the tool's origin, in world.
 struct HandGuideOutput {

@@ -3,21 +3,32 @@
 #include <memory>
 #include <span>
 
+#include "proxcgal/fields.hpp"
 #include "proxcgal/robot.hpp"
 #include "proxcgal/types.hpp"
 
 namespace proxcgal {
 
-/// What is remembered of what left the sensors' view. Ours: [WA] forgets it at the next scan.
+/// Memory of points that left the sensors' view. Ours: [WA] forgets them at the next scan.
 struct MemoryConfig {
-  double memory_s = 2.0;  ///< [s] age at which a point is forgotten in any case; 0: none is kept
-  double voxel = 0.05;    ///< [m] edge; each holds one point, the newest
-  int max_points = 1024;  ///< 3 or more; beyond, those farthest from the arm are forgotten
-  int clear_scans = 2;    ///< scans that must see through a point before it counts as gone
-
-  /// @throws ConfigError  with the field, its value and its bounds
-  void validate() const;
+  double memory_s = 2.0;
+  double voxel = 0.05;
+  int max_points = 1024;
+  int clear_scans = 2;
 };
+
+template <>
+inline constexpr auto fields<MemoryConfig> =
+    field_table("MemoryConfig", "Memory of points that left the sensors' view; ours, not [WA]'s.",
+                field(&MemoryConfig::memory_s, "memory_s", "s", at_least(0),
+                      "Age at which a point is forgotten in any case; 0: none is kept."),
+                field(&MemoryConfig::voxel, "voxel", "m", between(0.005, 0.5),
+                      "Edge of a voxel, which holds one point, the newest."),
+                // The one held, the nearest, and one that comes.
+                field(&MemoryConfig::max_points, "max_points", "", between(3, 65536),
+                      "Beyond this number, those farthest from the arm are forgotten."),
+                field(&MemoryConfig::clear_scans, "clear_scans", "", between(1, 100),
+                      "Scans that must see through a point before it counts as gone."));
 
 /// The sensors' zones and noise, as far as memory reckons with them.
 struct ViewModel {

@@ -3,6 +3,7 @@
 #include <memory>
 #include <span>
 
+#include "proxcgal/fields.hpp"
 #include "proxcgal/types.hpp"
 
 namespace proxcgal {
@@ -10,14 +11,24 @@ namespace proxcgal {
 /// How the closest obstacle's velocity is estimated, the x_o of [WA] eq. (4). Ours: the paper has
 /// the term and no way to get it.
 struct MotionConfig {
-  double window = 0.22;     ///< [s] scans that old count: four at 15 Hz
-  double radius = 0.15;     ///< [m] of the patch of surface round the closest point
-  double confidence = 4.0;  ///< standard deviations below which a velocity is taken for none
-  double max_speed = 2.0;   ///< [m/s] the estimate is shortened to it
-
-  /// @throws ConfigError  with the field, its value and its bounds
-  void validate() const;
+  double window = 0.22;
+  double radius = 0.15;
+  double confidence = 4.0;
+  double max_speed = 2.0;
 };
+
+template <>
+inline constexpr auto fields<MotionConfig> =
+    field_table("MotionConfig",
+                "How the closest obstacle's velocity is estimated, the x_o of [WA] eq. (4); ours.",
+                field(&MotionConfig::window, "window", "s", above(0).at_most(1),
+                      "Age up to which scans count; the default holds four at 15 Hz."),
+                field(&MotionConfig::radius, "radius", "m", above(0).at_most(1),
+                      "Radius of the patch of surface round the closest point."),
+                field(&MotionConfig::confidence, "confidence", "", at_least(0),
+                      "Standard deviations below which a velocity counts as none."),
+                field(&MotionConfig::max_speed, "max_speed", "m/s", at_least(0),
+                      "Speed to which the estimate is limited."));
 
 /// The last scans' points with their stamps, and the velocity of a patch of them.
 ///

@@ -1,4 +1,7 @@
 #pragma once
+#include <array>
+
+#include "proxcgal/fields.hpp"
 #include "proxcgal/robot.hpp"
 #include "proxcgal/types.hpp"
 
@@ -7,6 +10,9 @@ namespace proxcgal {
 /// `kFast` and `kPaper` give the same answer; the second is the literal algorithm over CGAL's own
 /// queries, kept as oracle and as the baseline of every timing.
 enum class Method : std::uint8_t { kFast, kPaper };
+template <>
+inline constexpr auto choices<Method> =
+    std::array{Choice{"fast", Method::kFast}, Choice{"paper", Method::kPaper}};
 
 /// When a point that passed the filter is believed.
 enum class Confirmation : std::uint8_t {
@@ -15,16 +21,38 @@ enum class Confirmation : std::uint8_t {
   kScans,  ///< the zone saw a similar range in one of the last two scans as well
 };
 
-/// How the robot's own body is told from obstacles: Algorithm 1 of [WA], and what noise adds.
+template <>
+inline constexpr auto choices<Confirmation> =
+    std::array{Choice{"off", Confirmation::kOff}, Choice{"zones", Confirmation::kZones},
+               Choice{"scans", Confirmation::kScans}};
+
 struct FilterConfig {
-  double tolerance = 0.02;     ///< [m] epsilon of Algorithm 1
-  double sigmas = 4.0;         ///< the tolerance is at least this many sigma(range)
-  double min_hit = 0.005;      ///< [m] nearer hits are the sensor's own mounting
-  bool surface_margin = true;  ///< also drop what lies that near to any link's surface
+  double tolerance = 0.02;
+  double sigmas = 4.0;
+  double min_hit = 0.005;
+  bool surface_margin = true;
   Confirmation confirmation = Confirmation::kOff;
-  double z_min = -kInfinity;  ///< [m] world height below which points are cropped (floor)
-  void validate() const;
+  double z_min = -kInfinity;
 };
+
+template <>
+inline constexpr auto fields<FilterConfig> = field_table(
+    "FilterConfig",
+    "How the robot's own body is told from obstacles ([WA] Algorithm 1, with a margin for noise).",
+    field(&FilterConfig::tolerance, "tolerance", "m", at_least(0),
+          "Distance to the first hit of its ray within which a point is body (epsilon of "
+          "Algorithm 1)."),
+    field(&FilterConfig::sigmas, "sigmas", "", at_least(0),
+          "The tolerance is at least this many standard deviations of the range."),
+    field(&FilterConfig::min_hit, "min_hit", "m", at_least(0),
+          "Nearer hits are the sensor's own mounting."),
+    field(&FilterConfig::surface_margin, "surface_margin",
+          "Also remove points within the tolerance of any link's surface."),
+    field(&FilterConfig::confirmation, "confirmation",
+          "Confirmation that a point needs: none, a similar range in a neighbouring zone of its "
+          "scan, or in its zone in one of the last two scans."),
+    field(&FilterConfig::z_min, "z_min", "m", finite().or_minus_infinite(),
+          "Points below this height in world are cropped (floor)."));
 
 /// Algorithm 1 of [WA]: clears `keep` where any link's first hit along a point's ray explains it.
 ///

@@ -1,7 +1,9 @@
 #pragma once
+#include <array>
 #include <string>
 #include <vector>
 
+#include "proxcgal/fields.hpp"
 #include "proxcgal/types.hpp"
 
 namespace proxcgal {
@@ -12,21 +14,44 @@ enum class RangeModel : std::uint8_t {
   kPrinted,  ///< x = d sin(alpha), as the paper prints it; for comparison only
 };
 
+template <>
+inline constexpr auto choices<RangeModel> =
+    std::array{Choice{"tangent", RangeModel::kTangent}, Choice{"printed", RangeModel::kPrinted}};
+
 /// Model of one VL53L8CX-like sensor and its noise (facts: data sheet, ST UM3109).
 struct SensorModel {
-  double field_of_view = 0.7853981633974483;  ///< [rad] along one side, 8 zones
-  double min_range = 0.02;                    ///< [m]
-  double max_range = 4.0;                     ///< [m]
-  double workspace = 1.3;                     ///< [m] along the ray; farther points are cropped
-  double sigma_floor = 0.005;                 ///< [m] least standard deviation of a range
-  double sigma_ratio = 0.015;                 ///< [-] of the range, where that is more
+  double field_of_view = 0.7853981633974483;
+  double min_range = 0.02;
+  double max_range = 4.0;
+  double workspace = 1.3;
+  double sigma_floor = 0.005;
+  double sigma_ratio = 0.015;
   RangeModel range_model = RangeModel::kTangent;
 
-  /// @throws ConfigError  with the field, its value and its bounds
-  void validate() const;
-  double sigma(double range) const;  ///< [m]
+  double sigma(double range) const;  ///< [m] standard deviation
   bool operator==(const SensorModel&) const = default;
 };
+
+template <>
+inline constexpr auto fields<SensorModel> = field_table(
+    "SensorModel",
+    "Model of one VL53L8CX-like sensor: 8 x 8 zones, distance along its z axis. SI units.",
+    field(&SensorModel::field_of_view, "field_of_view", "rad", above(0).below(3),
+          "Field of view along one side of the 8 x 8 zones."),
+    field(&SensorModel::min_range, "min_range", "m", at_least(0),
+          "Least range, along the sensor's z axis."),
+    field(&SensorModel::max_range, "max_range", "m", above(0),
+          "Largest range, along the sensor's z axis."),
+    field(&SensorModel::workspace, "workspace", "m", above(0).or_infinite(),
+          "Points farther along the ray are cropped."),
+    field(&SensorModel::sigma_floor, "sigma_floor", "m", at_least(0),
+          "Least standard deviation of a range."),
+    field(&SensorModel::sigma_ratio, "sigma_ratio", "", at_least(0),
+          "Standard deviation as a share of the range, where that is more than the floor."),
+    field(&SensorModel::range_model, "range_model",
+          "Form of [WA] eq. (1): x = d tan(alpha), as the sensor measures, or x = d sin(alpha), as "
+          "printed."));
+void check(const SensorModel& model, const std::string& path);
 
 /// Where one sensor sits: z looks out of the link's surface.
 struct Mount {

@@ -1,6 +1,8 @@
 #pragma once
+#include <array>
 #include <span>
 
+#include "proxcgal/fields.hpp"
 #include "proxcgal/types.hpp"
 
 namespace proxcgal {
@@ -10,16 +12,29 @@ enum class Damping : std::uint8_t {
   kCode,     ///< the authors' published code: s / (s^2 + p(s))
 };
 
+template <>
+inline constexpr auto choices<Damping> =
+    std::array{Choice{"literal", Damping::kLiteral}, Choice{"code", Damping::kCode}};
+
 /// Constants of the regularised pseudo-inverse, [iCAT].
 struct SolverConfig {
-  double damping = 1e-4;            ///< lambda, the most that is added to an eigenvalue
-  double damping_threshold = 0.01;  ///< s_th, eigenvalues up to it are damped
-  double eta = 10.0;                ///< cost of leaving the freedom that upper levels left
+  double damping = 1e-4;
+  double damping_threshold = 0.01;
+  double eta = 10.0;
   Damping form = Damping::kLiteral;
-
-  /// @throws ConfigError  with the field, its value and its bounds
-  void validate() const;
 };
+
+template <>
+inline constexpr auto fields<SolverConfig> = field_table(
+    "SolverConfig", "Constants of the regularised pseudo-inverse. Source: thesis eq. (4.7).",
+    field(&SolverConfig::damping, "damping", "", at_least(0),
+          "lambda: the most that is added to an eigenvalue."),
+    field(&SolverConfig::damping_threshold, "damping_threshold", "", above(0),
+          "s_th: eigenvalues of X'AX below it are damped, singular values below its square root."),
+    field(&SolverConfig::eta, "eta", "", at_least(0),
+          "Cost of leaving the freedom that upper levels left."),
+    field(&SolverConfig::form, "form",
+          "Damped inverse of s: 1 / (s + p) as eq. (4.7), or s / (s^2 + p) as its authors' code."));
 
 /// The joint velocities after each level; the last is the answer.
 struct Solution {

@@ -1,10 +1,7 @@
 #pragma once
 #include <span>
-#include <string>
-#include <utility>
-#include <variant>
-#include <vector>
 
+#include "proxcgal/pipeline/task_config.hpp"
 #include "proxcgal/robot.hpp"
 #include "proxcgal/types.hpp"
 
@@ -15,74 +12,8 @@ double decreasing(double x, double a, double b);
 /// 1 - decreasing.
 double increasing(double x, double a, double b);
 
-/// Keep the robot away from the nearest obstacle: [WA] eqs. (4) to (7).
-struct Avoidance {
-  double d_min = 0.20;   ///< [m] distance to keep
-  double buffer = 0.10;  ///< [m] Delta: the activation rises from 0 to 1 inside it
-  double gain = 2.0;     ///< [1/s] lambda
-  int nearest = 1;       ///< this many nearest links, one row each
-  void validate() const;
-};
-
-/// What of the goal is reached for: all of it in one level, or one half.
-enum class ReachRows : std::uint8_t { kBoth, kPosition, kOrientation };
-
-/// Bring the tool to the goal: [WA] eqs. (8) to (10), both rates saturated.
-struct Reach {
-  double gain = 1.0;         ///< [1/s] lambda
-  double max_linear = 0.25;  ///< [m/s]
-  double max_angular = 0.5;  ///< [rad/s]
-  ReachRows rows = ReachRows::kBoth;
-  void validate() const;
-};
-
-/// Keep every joint off its position limits.
-struct JointLimits {
-  double gain = 0.2;    ///< [1/s] towards the middle
-  double margin = 0.3;  ///< [rad] or [m] from a limit, where the activation begins
-  void validate() const;
-};
-
-/// Keep the tool above a height.
-struct MinimumAltitude {
-  double height = 0.30;  ///< [m]
-  double buffer = 0.10;  ///< [m] above it, where the activation begins
-  double gain = 0.5;     ///< [1/s]
-  void validate() const;
-};
-
-/// Keep one arm's manipulability up: mu = sqrt(det(J J')) of the tool's linear and angular rows,
-/// over the columns of that arm's joints.
-struct Manipulability {
-  double target = 0.12;  ///< [-] the rate pulls towards it
-  double low = 0.02;     ///< [-] fully active below
-  double high = 0.05;    ///< [-] inactive above
-  double gain = 0.1;     ///< [1/s]
-  int first_joint = 0;   ///< of the arm: 6 on the second arm of a 12-joint robot
-  int joints = 0;        ///< of the arm; 0 takes all from `first_joint` on
-  double unit = 1.0;     ///< mu is counted in it: 1, or the arm's own maximum
-  void validate() const;
-};
-
-/// Keep links off one another: rows for the nearest pairs of links. The same law as avoidance, the
-/// other link in the obstacle's place; ours, as the thesis has no formula for it.
-struct SelfCollision {
-  double d_min = 0.05;   ///< [m] distance to keep
-  double buffer = 0.05;  ///< [m] the activation rises from 0 to 1 inside it
-  double gain = 2.0;     ///< [1/s]
-  int nearest = 3;       ///< this many nearest pairs, one row each
-  /// Names of the links that are watched; empty: all that more than one joint moves apart.
-  std::vector<std::pair<std::string, std::string>> pairs;
-  void validate() const;
-};
-
-using TaskSpec =
-    std::variant<Avoidance, Reach, JointLimits, MinimumAltitude, Manipulability, SelfCollision>;
-const char* task_name(const TaskSpec& spec);
-/// @throws ConfigError  with the field, its value and its bounds
-void validate(const TaskSpec& spec);
-/// What only shows on a robot: manipulability needs six joints, inside the robot's own;
-/// self-collision links that exist.
+/// Checks that need a robot: manipulability needs six joints within the robot's own;
+/// self-collision needs links that exist.
 /// @throws ConfigError, ModelError
 void validate(const TaskSpec& spec, const Robot& robot);
 

@@ -13,11 +13,30 @@ struct GuardConfig {
   std::vector<LinkCapsule> capsules;
   SeparationConfig separation;
   SafetyTiming timing;
-  double tcp_speed = 1.30;          ///< [m/s] xd_UB
-  JointVector q_reference;          ///< (n,) posture of eq. (1)
-  JointVector qd_max, qdd_max;      ///< (n,) maxima of eqs. (1), (2); empty: the robot's own
-  std::vector<std::string> accept;  ///< contradictions that are known and wanted, item by item
+  double tcp_speed = 1.30;
+  JointVector q_reference;
+  JointVector qd_max, qdd_max;
+  std::vector<std::string> accept;
 };
+
+template <>
+inline constexpr auto fields<GuardConfig> = field_table(
+    "GuardConfig", "Set-up of the guard of walk-through programming. Source: [WT] section 3.",
+    field(&GuardConfig::capsules, "capsules", "", at_least(1),
+          "Capsules of the robot's links, base first.")
+        .required(),
+    field(&GuardConfig::q_reference, "q_reference", "rad", finite(),
+          "Posture of eqs. (1) and (2), one number a joint.")
+        .required(),
+    field(&GuardConfig::tcp_speed, "tcp_speed", "m/s", above(0).or_infinite(),
+          "xd_UB: maximum speed of the tool."),
+    field(&GuardConfig::qd_max, "qd_max", "rad/s", finite(),
+          "Maximum speeds of eq. (1), one a joint; empty: the robot's own."),
+    field(&GuardConfig::qdd_max, "qdd_max", "rad/s^2", finite(),
+          "Maximum accelerations of eq. (2), one a joint; empty: the robot's own."),
+    fields_of(&GuardConfig::timing), fields_of(&GuardConfig::separation),
+    field(&GuardConfig::accept, "accept",
+          "Contradictions that are accepted, item by item, as `guard_contradictions` names them."));
 
 /// A setting that another one contradicts.
 struct Contradiction {

@@ -1,28 +1,60 @@
 #pragma once
 #include <array>
 
+#include "proxcgal/fields.hpp"
 #include "proxcgal/types.hpp"
 
 namespace proxcgal {
 
-/// Freshness bounds; the rest of the table is fixed (docs/conventions.md).
+/// Bounds of the monitor; which finding calls for which mode is fixed (docs/conventions.md).
 struct MonitorConfig {
-  double degraded_after = 0.14;  ///< [s] age at which one silent sensor degrades the mode
-  double hold_after = 0.19;      ///< [s] age at which the silence of an array holds the arm
-  double degraded_scale = 0.5;   ///< [-] of the speed limits while degraded
-  int clean_cycles = 10;         ///< cycles without a cause before HOLD or DEGRADED clears
-  int missed_deadlines = 3;      ///< in a row, before HOLD
-  int suspect_repeats = 5;      ///< equal payloads in a row that make a sensor suspect, 0 for never
-  double fresh_within = 0.10;   ///< [s] a scan of this age is trusted as it is
-  double approach_speed = 1.6;  ///< [m/s] assumed of what moves in: past `fresh_within` it
-                                ///< shortens the distance that is trusted
-  double blind_speed = 0.25;    ///< [m/s] at most into what a silent sensor covered, 0 in the end
-  double joints_hold_after = 0.02;  ///< [s] age of the joint state that holds the arm
-  double joints_stop_after = 0.10;  ///< [s] age of the joint state that stops it
-  double stuck_after = 0.1;         ///< [s] of avoidance not executed inside d_min, before HOLD
-  bool await_mounts = false;        ///< HOLD until `Controller::accept_mounts`
-  void validate() const;
+  double degraded_after = 0.14;
+  double hold_after = 0.19;
+  double degraded_scale = 0.5;
+  int clean_cycles = 10;
+  int missed_deadlines = 3;
+  int suspect_repeats = 5;
+  double fresh_within = 0.10;
+  double approach_speed = 1.6;
+  double blind_speed = 0.25;
+  double joints_hold_after = 0.02;
+  double joints_stop_after = 0.10;
+  double stuck_after = 0.1;
+  bool await_mounts = false;
 };
+
+template <>
+inline constexpr auto fields<MonitorConfig> = field_table(
+    "MonitorConfig", "Bounds of the monitor.",
+    field(&MonitorConfig::degraded_after, "degraded_after", "s", above(0).or_infinite(),
+          "Age of one sensor's scan that degrades the mode."),
+    field(&MonitorConfig::hold_after, "hold_after", "s", above(0).or_infinite(),
+          "Age of an array's scans that holds the arm."),
+    field(&MonitorConfig::degraded_scale, "degraded_scale", "", between(0, 1),
+          "Factor on the speed limits while degraded."),
+    field(&MonitorConfig::clean_cycles, "clean_cycles", "", at_least(1),
+          "Cycles without a cause before HOLD or DEGRADED clears."),
+    field(&MonitorConfig::missed_deadlines, "missed_deadlines", "", at_least(1),
+          "Missed deadlines in a row that hold the arm."),
+    field(&MonitorConfig::suspect_repeats, "suspect_repeats", "", at_least(0),
+          "Equal payloads in a row that make a sensor suspect; 0: never (sensors without noise)."),
+    field(&MonitorConfig::fresh_within, "fresh_within", "s", above(0).or_infinite(),
+          "Distances of a scan up to this age are trusted as measured."),
+    field(&MonitorConfig::approach_speed, "approach_speed", "m/s", at_least(0).or_infinite(),
+          "Assumed speed of an obstacle since its scan: shortens the trusted distance past "
+          "`fresh_within`."),
+    field(&MonitorConfig::blind_speed, "blind_speed", "m/s", at_least(0).or_infinite(),
+          "Maximum speed into the region that a silent sensor covered; falls to 0 at "
+          "`hold_after`."),
+    field(&MonitorConfig::joints_hold_after, "joints_hold_after", "s", above(0).or_infinite(),
+          "Age of the joint state that holds the arm."),
+    field(&MonitorConfig::joints_stop_after, "joints_stop_after", "s", above(0).or_infinite(),
+          "Age of the joint state that stops the arm."),
+    field(&MonitorConfig::stuck_after, "stuck_after", "s", above(0).or_infinite(),
+          "Time with avoidance not executed inside d_min that holds the arm."),
+    field(&MonitorConfig::await_mounts, "await_mounts",
+          "Hold the arm until `Controller.accept_mounts` confirms the checked mounts."));
+void check(const MonitorConfig& config, const std::string& path);
 
 inline constexpr int kMaxFindings = 64;
 inline constexpr double kClockResolution = 1e-3;  ///< [s] a stamp may be that far in the future

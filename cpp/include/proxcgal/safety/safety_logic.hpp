@@ -1,6 +1,8 @@
 #pragma once
+#include <array>
 #include <cstdint>
 
+#include "proxcgal/fields.hpp"
 #include "proxcgal/robot.hpp"
 #include "proxcgal/types.hpp"
 
@@ -49,6 +51,11 @@ enum class TorqueState : std::uint8_t {
   kStopping,  ///< torque is off, the arm is not yet at rest
 };
 
+template <>
+inline constexpr auto choices<TorqueState> =
+    std::array{Choice{"off", TorqueState::kOff}, Choice{"on", TorqueState::kOn},
+               Choice{"stopping", TorqueState::kStopping}};
+
 /// What the safety logic is told in one cycle.
 struct SafetyInput {
   double time = 0.0;  ///< [s] the caller's monotonic clock
@@ -76,11 +83,22 @@ struct SafetyOutput {
 };
 
 struct SafetyTiming {
-  double stop_time = 0.35;   ///< [s] declared: at rest by then
-  double rest_speed = 0.01;  ///< [rad/s] of every joint, at rest
-  double period = 0.001;     ///< [s] of the cycle
-  double max_gap = 0.0025;   ///< [s] a longer cycle cuts the torque
+  double stop_time = 0.35;
+  double rest_speed = 0.01;
+  double period = 0.001;
+  double max_gap = 0.0025;
 };
+
+template <>
+inline constexpr auto fields<SafetyTiming> = field_table(
+    "SafetyTiming", "Times of the safety logic.",
+    field(&SafetyTiming::stop_time, "stop_time", "s", above(0),
+          "stopT: declared stopping time, after which the arm is at rest."),
+    field(&SafetyTiming::rest_speed, "rest_speed", "rad/s", above(0),
+          "Speed of every joint at rest, at most."),
+    field(&SafetyTiming::period, "period", "s", above(0), "Period of the cycle."),
+    field(&SafetyTiming::max_gap, "max_gap", "s", above(0), "A longer cycle cuts the torque."));
+void check(const SafetyTiming& timing, const std::string& path);
 
 /// Safety logic of [WT] Fig. 5: the basic safety functions, and Safe Torque Off.
 ///

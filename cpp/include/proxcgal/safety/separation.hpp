@@ -2,6 +2,7 @@
 #include <string>
 #include <vector>
 
+#include "proxcgal/fields.hpp"
 #include "proxcgal/geometry/capsule.hpp"
 #include "proxcgal/robot.hpp"
 
@@ -17,21 +18,43 @@ struct LinkCapsule {
 /// The operator: one capsule that rides on the tool, [WT] 2.2. It stands upright however the tool
 /// is turned; `offset_T` is where its middle is.
 struct OperatorCapsule {
-  double radius = 0.200;                       ///< [m]
-  double height = 1.80;                        ///< [m] in all, rounding included
-  Vector3 offset_T = Vector3(0.0, 0.0, 0.25);  ///< [m] opRelP
+  double radius = 0.200;
+  double height = 1.80;
+  Vector3 offset_T = Vector3(0.0, 0.0, 0.25);
   Capsule at(const Pose& T_WT) const;
 };
 
-/// What the separation distance of ISO/TS 15066 is computed with.
+template <>
+inline constexpr auto fields<OperatorCapsule> = field_table(
+    "OperatorCapsule", "Capsule of the operator, which rides on the tool and stands upright.",
+    field(&OperatorCapsule::radius, "radius", "m", above(0), "opRad: radius."),
+    field(&OperatorCapsule::height, "height", "m", above(0), "opH: height, rounding included."),
+    field(&OperatorCapsule::offset_T, "offset", "m", finite(),
+          "opRelP: position of its middle in the tool's frame."));
+void check(const OperatorCapsule& config, const std::string& path);
+
+/// Terms of the separation distance of ISO/TS 15066.
 struct IsoSeparation {
-  double human_speed = 1.6;           ///< [m/s] ISO 13855
-  double reaction_time = 1.0 / 15.0;  ///< [s] T_r: one frame of a sensor that would see the human
-  double intrusion = 0.0;             ///< [m] C
-  double human_uncertainty = 0.0;     ///< [m] Z_d
-  double robot_uncertainty = 0.0;     ///< [m] Z_r
-  void validate() const;              ///< @throws ConfigError
+  double human_speed = 1.6;
+  double reaction_time = 1.0 / 15.0;
+  double intrusion = 0.0;
+  double human_uncertainty = 0.0;
+  double robot_uncertainty = 0.0;
 };
+
+template <>
+inline constexpr auto fields<IsoSeparation> = field_table(
+    "IsoSeparation", "Terms of the separation distance of ISO/TS 15066.",
+    field(&IsoSeparation::human_speed, "human_speed", "m/s", at_least(0),
+          "v_h: speed of the human, by ISO 13855."),
+    field(&IsoSeparation::reaction_time, "reaction_time", "s", at_least(0),
+          "T_r: reaction time, one frame of a sensor that would see the human."),
+    field(&IsoSeparation::intrusion, "intrusion", "m", finite(), "C: intrusion distance."),
+    field(&IsoSeparation::human_uncertainty, "human_uncertainty", "m", finite(),
+          "Z_d: position uncertainty of the human."),
+    field(&IsoSeparation::robot_uncertainty, "robot_uncertainty", "m", finite(),
+          "Z_r: position uncertainty of the robot."));
+void check(const IsoSeparation& iso, const std::string& path);
 
 /// S_p = v_h (T_r + T_s) + v_r T_r + v_r T_s / 2 + C + Z_d + Z_r [m]: constant speeds, constant
 /// deceleration over the stopping time T_s.
@@ -39,13 +62,29 @@ double protective_distance(const IsoSeparation& iso, double robot_speed, double 
 
 struct SeparationConfig {
   OperatorCapsule human;
-  std::vector<std::string> pairs;  ///< capsules whose distance counts, by name; none: all
-  std::vector<std::string> ends;   ///< capsules whose far ends' velocity counts; none: all
-  double min_distance = 0.455;     ///< [m] minDistTh
-  double max_velocity = 1.30;      ///< [m/s] maxVelTh
-  bool subtract_human = false;     ///< relative to the operator, where the velocity is known
+  std::vector<std::string> pairs;
+  std::vector<std::string> ends;
+  double min_distance = 0.455;
+  double max_velocity = 1.30;
+  bool subtract_human = false;
   IsoSeparation iso;
 };
+
+template <>
+inline constexpr auto fields<SeparationConfig> = field_table(
+    "SeparationConfig", "Limits of distance and relative velocity between robot and operator.",
+    field(&SeparationConfig::min_distance, "min_distance", "m", at_least(0),
+          "minDistTh: least distance to the operator."),
+    field(&SeparationConfig::max_velocity, "max_velocity", "m/s", above(0),
+          "maxVelTh: maximum velocity towards the operator."),
+    field(&SeparationConfig::pairs, "pairs",
+          "Names of the capsules whose distance counts; empty: all."),
+    field(&SeparationConfig::ends, "ends",
+          "Names of the capsules whose far ends' velocity counts; empty: all."),
+    fields_of(&SeparationConfig::human, "human_"),
+    field(&SeparationConfig::subtract_human, "subtract_human",
+          "Velocity is relative to the operator, where the operator's is known."),
+    field(&SeparationConfig::iso, "iso", "Terms of the separation distance of ISO/TS 15066."));
 
 /// What one cycle found.
 struct SeparationOutput {
