@@ -284,7 +284,7 @@ def test_a_stack_that_does_not_fit_is_told() -> None:
         (lambda: px.Avoidance(nearest=0), r"Avoidance\.nearest is 0, must be between 1 and 32"),
         (lambda: px.Reach(max_linear=0), r"Reach\.max_linear is 0 m/s, must be finite and above 0"),
         (lambda: px.JointLimits(margin=-1), r"JointLimits\.margin is -1 rad or m, must be finite"),
-        (lambda: px.MinimumAltitude(height=np.nan), r"MinimumAltitude\.height is nan, .*finite"),
+        (lambda: px.MinimumAltitude(height=np.nan), r"MinimumAltitude\.height is nan m, .*finite"),
         (lambda: px.Manipulability(low=0.2), r"Manipulability\.high is 0\.05, .*above low"),
         (lambda: px.Manipulability(joints=5), r"Manipulability\.joints is 5, .*between 6 and 32"),
     ],

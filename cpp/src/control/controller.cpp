@@ -49,6 +49,7 @@ struct Controller::Impl {
   Posture posture;
   const Points none_W = Points(0, 3);
   Points estimate_W = Points::Zero(1, 3);  // velocity of the closest obstacle [m/s]
+  const PointsRef estimate_ref_W = estimate_W;
   Solution solution;
   TickOutput out;
 
@@ -113,11 +114,8 @@ struct Controller::Impl {
     return box;
   }
 
-  /// From the joint state and a cloud to an admissible velocity.
-  /// @param sensed  the cloud is the sensors', row by row; else it is known
-  void act(const JointVector& q, const PointsRef& cloud_W, bool sensed,
-           const detail::ObstacleVelocities& velocities, const Pose& goal) {
-    detail::Stopwatch watch(config.timings);
+  /// The nearest pair ([WA] Algorithm 2), and how far its distance is to be trusted.
+  void find_nearest(const PointsRef& cloud_W, bool sensed) {
     out.pair = control_points.nearest(clock.now(), *robot, posture, cloud_W, trusted.d_min(),
                                       stack.engaged_within(), monitor);
     if (sensed) {
@@ -125,35 +123,64 @@ struct Controller::Impl {
     } else {
       trusted.of_known(posture, out);
     }
-    if (out.pair) out.obstacle_velocity_W = velocities.of(out.pair->point);
-    if (out.pair && sensed && config.motion) {
-      const Vector3& obstacle_W = out.pair->obstacle_W;
-      out.obstacle_velocity_W = perception.velocity_W(clock.now(), obstacle_W);
-      estimate_W.row(0) = out.obstacle_velocity_W.transpose();
-      const PointsRef moving_W(estimate_W);
-      const detail::ObstacleVelocities estimated(moving_W, cloud_W, obstacle_W,
-                                                 config.motion->radius);
-      stack.build(posture, cloud_W, estimated, goal, control_points, trusted, out, monitor);
-    } else {
-      stack.build(posture, cloud_W, velocities, goal, control_points, trusted, out, monitor);
-    }
-    out.timings.distance_us = watch.lap_us();
+  }
+
+  /// How obstacles move: as given or, of sensed points, as estimated round the pair's obstacle.
+  detail::ObstacleVelocities velocities_of(const PointsRef& cloud_W, bool sensed,
+                                           const detail::ObstacleVelocities& given) {
+    if (!out.pair) return given;
+    const Vector3& obstacle_W = out.pair->obstacle_W;
+    out.obstacle_velocity_W = given.of(out.pair->point);
+    if (!sensed || !config.motion) return given;
+    out.obstacle_velocity_W = perception.velocity_W(clock.now(), obstacle_W);
+    estimate_W.row(0) = out.obstacle_velocity_W.transpose();
+    return {estimate_ref_W, cloud_W, obstacle_W, config.motion->radius};
+  }
+
+  /// The solution after each level of the stack.
+  std::span<const JointVector> solve_stack() {
     solve(stack.tasks(), robot->n_q(), limits.qd_max, config.solver, solution);
-    // By the last tick's mode: this one's findings are not complete yet.
-    const double scale = monitor.slowed() ? config.monitor.degraded_scale : 1.0;
-    const Admissible box = admissible_now(q, scale);
-    const std::span<const JointVector> levels(solution.rho.data(),
-                                              static_cast<std::size_t>(solution.levels) + 1);
+    return {solution.rho.data(), static_cast<std::size_t>(solution.levels) + 1};
+  }
+
+  /// The velocities of this tick, slower while degraded: by the last tick's mode, as this one's
+  /// findings are not complete yet.
+  Admissible admissible_by_mode(const JointVector& q) const {
+    return admissible_now(q, monitor.slowed() ? config.monitor.degraded_scale : 1.0);
+  }
+
+  /// From the solution to the velocity that is sent.
+  /// @return  was it reduced because of a region that is not seen?
+  bool limit(std::span<const JointVector> levels, bool sensed, const Admissible& box) {
     command(levels, stack.tasks(), qd_last, box, out.qd);
     stack.catch_up(levels, box, out.qd);
-    // What is known to be there has the last word over what may be where nothing is seen.
-    const JointVector solved = out.qd;
+    const JointVector before = out.qd;
     if (sensed)
       approach_limits.slow_into_unseen(clock.now(), posture, perception, box, out, monitor);
-    const bool cut_back = (out.qd.array() != solved.array()).any();
+    const bool cut_back = (out.qd.array() != before.array()).any();
+    // After the above: a known obstacle takes precedence over a region that is not seen.
     approach_limits.keep_off(posture, trusted, box, out);
+    return cut_back;
+  }
+
+  /// From the joint state and a cloud to an admissible velocity.
+  /// @param sensed  the cloud is the sensors', row by row; else it is known
+  void act(const JointVector& q, const PointsRef& cloud_W, bool sensed,
+           const detail::ObstacleVelocities& given, const Pose& goal) {
+    detail::Stopwatch watch(config.timings);
+    find_nearest(cloud_W, sensed);                                              // Algorithm 2
+    stack.build(posture, cloud_W, velocities_of(cloud_W, sensed, given), goal,  // eqs. (4) to (10)
+                control_points, trusted, out, monitor);
+    out.timings.distance_us = watch.lap_us();
+    const std::span<const JointVector> levels = solve_stack();  // [iCAT] (4.7), (4.8)
+    const Admissible box = admissible_by_mode(q);
+    const bool cut_back = limit(levels, sensed, box);
     out.timings.solve_us = watch.lap_us();
     execution.judge(clock.now(), stack, {levels, qd_last, box, cut_back}, trusted, out, monitor);
+    note_outside_limits(q);
+  }
+
+  void note_outside_limits(const JointVector& q) {
     if ((q.array() < limits.q_min.array() || q.array() > limits.q_max.array()).any())
       note(Reason::kOutsideLimits);
   }

@@ -1,6 +1,5 @@
 #include "proxcgal/guiding/hand_guide.hpp"
 
-#include <cmath>
 #include <string>
 #include <utility>
 

@@ -1,13 +1,11 @@
 #include "proxcgal/perception/memory.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <vector>
 
 #include "geometry/frames.hpp"
 #include "geometry/point_chunk.hpp"
 #include "geometry/voxel_index.hpp"
-#include "proxcgal/error.hpp"
 #include "sight_lines.hpp"
 
 namespace proxcgal {

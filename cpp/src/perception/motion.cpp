@@ -6,8 +6,6 @@
 #include <cmath>
 #include <vector>
 
-#include "proxcgal/error.hpp"
-
 namespace proxcgal {
 namespace {
 

@@ -6,7 +6,6 @@
 
 #include "geometry/frames.hpp"
 #include "geometry/point_chunk.hpp"
-#include "proxcgal/error.hpp"
 
 namespace proxcgal {
 namespace {

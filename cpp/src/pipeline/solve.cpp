@@ -7,7 +7,6 @@
 #include <numbers>
 
 #include "geometry/velocity_box.hpp"
-#include "proxcgal/error.hpp"
 
 namespace proxcgal {
 namespace {

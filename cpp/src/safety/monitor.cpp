@@ -1,7 +1,6 @@
 #include "proxcgal/safety/monitor.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "proxcgal/error.hpp"
 
