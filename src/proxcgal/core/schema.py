@@ -39,12 +39,12 @@ class Section(BaseModel):
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
 
 
-def core_table(struct: str, *, only: Collection[str] = (), omit: Collection[str] = ()) -> Any:
+def core_table(struct: str, *, only: Sequence[str] = (), omit: Collection[str] = ()) -> Any:
     """Base of a table whose keys are the settings of a config struct of the core.
 
     Args:
         struct: its name in `_core.field_tables()`: keys, types, bounds, defaults, descriptions.
-        only: these settings; empty for all.
+        only: these settings, in this order; empty for all.
         omit: settings that a file does not have.
     """
     return table_from(struct, field_tables()[struct], only, omit)
@@ -69,15 +69,13 @@ def _record(struct: str, setting: str) -> FieldRecord:
 def table_from(
     struct: str,
     records: Sequence[FieldRecord],
-    only: Collection[str] = (),
+    only: Sequence[str] = (),
     omit: Collection[str] = (),
 ) -> type[Section]:
     """The same from a table of fields, such as another module's of its own."""
-    keys: dict[str, Any] = {
-        record.name: (_annotation(record), _field(record))
-        for record in records
-        if record.name not in omit and (not only or record.name in only)
-    }
+    every = {record.name: record for record in records if record.name not in omit}
+    chosen = [every[name] for name in only or every]
+    keys: dict[str, Any] = {each.name: (_annotation(each), _field(each)) for each in chosen}
     return create_model(struct, __base__=Section, **keys)
 
 

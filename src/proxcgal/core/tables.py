@@ -29,3 +29,8 @@ def in_metres(value: float | None) -> str:
     if value is None:
         return "-"
     return "none" if value >= NOTHING_M else f"{value:.3f}"
+
+
+def capitalised(text: str) -> str:
+    """Text with a capital first; the rest as it is."""
+    return text[:1].upper() + text[1:]

@@ -74,10 +74,6 @@ def _key(name: str) -> str:
     return name if _BARE.fullmatch(name) else _quoted(name)
 
 
-def _is_tables(value: object) -> bool:
-    return isinstance(value, list | tuple) and bool(value) and isinstance(value[0], Mapping)
-
-
 def write(table: Mapping[str, Any], path: str = "") -> str:
     """TOML text of nested tables; keys that are None are left out, `path` is as written."""
     plain, nested = [], []
@@ -87,7 +83,7 @@ def write(table: Mapping[str, Any], path: str = "") -> str:
         name = f"{path}.{_key(key)}" if path else _key(key)
         if isinstance(value, Mapping):
             nested.append(f"\n[{name}]\n" + write(value, name))
-        elif _is_tables(value):
+        elif isinstance(value, list | tuple) and value and isinstance(value[0], Mapping):
             nested.extend(f"\n[[{name}]]\n" + write(item, name) for item in value)
         else:
             plain.append(f"{_key(key)} = {format_value(value)}\n")

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from html import escape
 
-from proxcgal.core.tables import in_metres
+from proxcgal.core.tables import capitalised, in_metres
 from proxcgal.evaluation.metrics import COVERAGE_KEYS, SELF_LIMIT_M
 from proxcgal.report.document import (
     Pictures,
@@ -74,7 +74,7 @@ def _parts(runs: Sequence[StoredRun], about: About) -> Iterator[str]:
     for run, replay in zip(runs, played, strict=True):
         yield f"<h2>{escape(run.summary.scenario)}</h2>"
         if run.about.description:
-            yield f"<p>{escape(_sentence(run.about.description))}</p>"
+            yield f"<p>{escape(capitalised(run.about.description).rstrip('. '))}.</p>"
         if _beside_a_person(run):
             yield from _phases(run)
         for name, caption in _pictures(run):
@@ -231,11 +231,6 @@ def _verdict(runs: Sequence[StoredRun]) -> Iterator[str]:
         '<p class="soft">Reaching the goal is not asked for: keeping the distance comes first. '
         "These are engineering figures from a simulation, not a certificate of any kind.</p>"
     )
-
-
-def _sentence(text: str) -> str:
-    """Text as a sentence: a capital first, a full stop last."""
-    return text[:1].upper() + text[1:].rstrip(". ") + "."
 
 
 def _coverage(run: StoredRun) -> Iterator[str]:

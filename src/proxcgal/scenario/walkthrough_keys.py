@@ -1,10 +1,8 @@
 """The keys of a walk-through: `[guard]`, `[[leg]]`, `[hand]`, `[admittance]`, `[playback]`, ..."""
 
-from typing import Annotated
-
 from pydantic import Field
 
-from proxcgal.core.schema import NonNegative, Positive, Section, Share, Vector, core_key, core_table
+from proxcgal.core.schema import NonNegative, Positive, Section, Share, Vector, core_table
 
 
 class HumanKeys(core_table("OperatorCapsule")):
@@ -15,22 +13,26 @@ class IsoKeys(core_table("IsoSeparation")):
     """What the separation distance of ISO/TS 15066 is computed with, beside the threshold."""
 
 
-class GuardKeys(Section):
+class GuardKeys(
+    core_table(
+        "GuardConfig",
+        only=(
+            "tcp_speed",
+            "stop_time",
+            "rest_speed",
+            "max_gap",
+            "min_distance",
+            "max_velocity",
+            "q_reference",
+            "pairs",
+            "ends",
+            "subtract_human",
+            "accept",
+        ),
+    )
+):
     """The guard: [WT] section 3."""
 
-    tcp_speed: float = core_key("GuardConfig", "tcp_speed")
-    stop_time: float = core_key("GuardConfig", "stop_time")
-    rest_speed: float = core_key("GuardConfig", "rest_speed")
-    max_gap: float = core_key("GuardConfig", "max_gap")
-    min_distance: float = core_key("GuardConfig", "min_distance")
-    max_velocity: float = core_key("GuardConfig", "max_velocity")
-    q_reference: Annotated[tuple[float, ...], Field(min_length=1)] = core_key(
-        "GuardConfig", "q_reference"
-    )
-    pairs: tuple[str, ...] = core_key("GuardConfig", "pairs")
-    ends: tuple[str, ...] = core_key("GuardConfig", "ends")
-    subtract_human: bool = core_key("GuardConfig", "subtract_human")
-    accept: tuple[str, ...] = core_key("GuardConfig", "accept")
     human: HumanKeys = Field(default_factory=HumanKeys)
     iso: IsoKeys = Field(default_factory=IsoKeys)
 

@@ -50,7 +50,10 @@ class AccessControl:
             return self._refuse("a header came twice")
         host = request.headers.get("Host", "")
         # A page of another site, or a name that was made to point here, must not reach us.
-        if self._loopback_only and _name(host) not in LOOPBACK:
+        if (
+            self._loopback_only
+            and (urllib.parse.urlsplit(f"//{host}").hostname or "") not in LOOPBACK
+        ):
             return self._refuse(
                 f"host {host!r} is not served here: open http://127.0.0.1:{_port(host)}"
             )
@@ -111,11 +114,6 @@ class AccessControl:
         headers = Headers({"Content-Type": "text/plain; charset=utf-8", "Connection": "close",
                            "Content-Length": str(len(body))})  # fmt: skip
         return Response(status.value, status.phrase, headers, body)
-
-
-def _name(host: str) -> str:
-    """The name in a Host header, its port and brackets apart."""
-    return urllib.parse.urlsplit(f"//{host}").hostname or ""
 
 
 def _port(host: str) -> int:

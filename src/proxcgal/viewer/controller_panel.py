@@ -126,8 +126,10 @@ class ControllerPanel(Panel):
 
     def _hook_choices(self) -> None:
         read: dict[str, Callable[[Any], Any]] = {
-            "vertices": _number_of, "controller": str, "robot": str,
-        }  # fmt: skip
+            "vertices": lambda text: 0 if text == _AS_THEY_ARE else int(text.split()[0]),
+            "controller": str,
+            "robot": str,
+        }
         for name, control in (*self._lists.items(), *self._sliders.items()):
 
             async def changed(event: Any, name: str = name) -> None:
@@ -138,7 +140,3 @@ class ControllerPanel(Panel):
 
 def _count(vertices: int) -> str:
     return f"{vertices} vertices a link" if vertices else _AS_THEY_ARE
-
-
-def _number_of(text: str) -> int:
-    return 0 if text == _AS_THEY_ARE else int(text.split()[0])

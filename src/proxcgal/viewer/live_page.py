@@ -14,13 +14,14 @@ from proxcgal.core.errors import ProxError, SimulationError
 from proxcgal.models.mesh.display import display_meshes
 from proxcgal.scenario.scenario import Scenario
 from proxcgal.scenario.setup import make_robot
+from proxcgal.scenario.walkthrough_scenario import WalkScenario
 from proxcgal.viewer.access import AccessControl
 from proxcgal.viewer.choice import Choice
 from proxcgal.viewer.command_queue import CommandQueue
 from proxcgal.viewer.controller_panel import ControllerPanel
 from proxcgal.viewer.drawing import Drawing, add_surroundings
 from proxcgal.viewer.messages import Update
-from proxcgal.viewer.simulation import FRAME_HZ, is_walk, run_simulation
+from proxcgal.viewer.simulation import FRAME_HZ, run_simulation
 from proxcgal.viewer.walkthrough_panel import WalkPanel
 
 PLOT_HZ = 4.0
@@ -55,7 +56,7 @@ class LivePage:
         self._server = server
         self._panel: ControllerPanel | WalkPanel = (
             WalkPanel(server, access, self.queue, scenario)
-            if is_walk(scenario)
+            if isinstance(scenario, WalkScenario)
             else ControllerPanel(server, access, self.queue, scenario, controller)
         )
         self._drawing: Drawing | None = None

@@ -5,11 +5,11 @@ import sys
 import threading
 
 from proxcgal.scenario.scenario import Scenario
+from proxcgal.scenario.walkthrough_scenario import WalkScenario
 from proxcgal.study.runs.preparation import check_setup
 from proxcgal.trial.walkthrough.setup import WalkSetup
 from proxcgal.viewer.live_page import LivePage
 from proxcgal.viewer.page_server import page_address, served_page
-from proxcgal.viewer.simulation import is_walk
 
 
 def view_scenario(
@@ -28,7 +28,7 @@ def view_scenario(
         ProxError: what of the scenario does not fit, an address that cannot be listened on, a
             simulation that failed.
     """
-    if is_walk(scenario):
+    if isinstance(scenario, WalkScenario):
         print("\n".join(WalkSetup.of(scenario).notes()))
     else:
         check_setup(scenario, [controller])

@@ -10,7 +10,6 @@ import warnings
 from collections import deque
 from collections.abc import Iterable
 from multiprocessing.connection import Connection
-from typing import TypeGuard
 
 import numpy as np
 
@@ -26,11 +25,6 @@ from proxcgal.viewer.scene_model import SceneModel
 FRAME_HZ = 15.0  #: moments that are offered to the page
 LOST = 0.1  #: [s] behind real time from which what is lost stays lost
 _LATENESS = 1000  # ticks whose lateness is reported
-
-
-def is_walk(scenario: Scenario) -> TypeGuard[WalkScenario]:
-    """Is it the walk-through cell, which has a guard and no controller to choose?"""
-    return isinstance(scenario, WalkScenario)
 
 
 def run_simulation(
@@ -61,12 +55,16 @@ class _Simulation:
         self._outbox = outbox
         self._link = link
         self._base = scenario
-        self._choice = None if is_walk(scenario) else Choice.of(scenario, controller)
+        self._choice = (
+            None if isinstance(scenario, WalkScenario) else Choice.of(scenario, controller)
+        )
         self._frame = 1.0 / hz
         self._silent: frozenset[int] = frozenset()
         self._running = True
         self._trial: LiveTrial | WalkTrial = (
-            WalkTrial(scenario) if is_walk(scenario) else LiveTrial(scenario, controller)
+            WalkTrial(scenario)
+            if isinstance(scenario, WalkScenario)
+            else LiveTrial(scenario, controller)
         )
         self._first_step()
         self._send_model()

@@ -5,7 +5,7 @@ from statistics import median
 from typing import Any
 
 from proxcgal.core.files import NOTHING_M
-from proxcgal.core.tables import in_metres
+from proxcgal.core.tables import capitalised, in_metres
 from proxcgal.evaluation.metrics import SELF_LIMIT_M, Summary
 from proxcgal.evaluation.trial_log import TOO_CLOSE
 from proxcgal.study.campaign import Listing, file_name
@@ -47,7 +47,8 @@ def listings(summary: Summary) -> list[Listing]:
             rows=[_known_row(run) for run in known], left=4,
         ),
         Listing(
-            caption=f"{_sentence(compared)} on known obstacles, and on what sensors see. Reached: "
+            caption=f"{capitalised(compared)} on known obstacles, and on what sensors see. "
+            "Reached: "
             "runs that did. Least and median of the true distances. Too close: runs that came "
             "under 0.05 m; unseen: those of them in which the cloud's nearest point was then more "
             "than 0.05 m farther away than the obstacle. Link: the one that came nearest.",
@@ -166,7 +167,7 @@ def _sensing(runs: Sequence[Run]) -> Iterator[str]:
         close = [run for run in own if run["true_min_m"] < TOO_CLOSE]
         nearest = min(own, key=lambda run: run["true_min_m"])
         text = (
-            f"{_sentence(PERCEPTION_NAMES.get(perception, perception))}: {_reached(own)} of "
+            f"{capitalised(PERCEPTION_NAMES.get(perception, perception))}: {_reached(own)} of "
             f"{len(own)} runs reach the goal, {len(close)} come under {TOO_CLOSE} m of an obstacle"
         )
         if close:
@@ -238,10 +239,6 @@ def _grouped(runs: Sequence[Run], *keys: str) -> Iterator[tuple[tuple[str, ...],
     for run in runs:
         groups.setdefault(tuple(run[key] for key in keys), []).append(run)
     yield from groups.items()
-
-
-def _sentence(text: str) -> str:
-    return text[:1].upper() + text[1:]
 
 
 def captions(summary: Summary) -> dict[str, str]:

@@ -27,19 +27,9 @@ def figures(table: pl.DataFrame, _: Summary | None = None) -> dict[str, Figure]:
     """Two a scene: distributions at the end, pairs, differences; what memory gives back."""
     drawn: dict[str, Figure] = {}
     for (scene,), own in table.group_by(["scene"], maintain_order=True):
-        drawn[scene_file(str(scene))] = scene_figure(str(scene), own)
-        drawn[memory_file(str(scene))] = memory_figure(str(scene), own)
+        drawn[file_name(f"{scene}.png")] = scene_figure(str(scene), own)
+        drawn[file_name(f"{scene}_memory.png")] = memory_figure(str(scene), own)
     return drawn
-
-
-def scene_file(scene: str) -> str:
-    """Name of a scene's figure."""
-    return f"{file_name(scene)}.png"
-
-
-def memory_file(scene: str) -> str:
-    """Name of the figure of what memory gives back."""
-    return f"{file_name(scene)}_memory.png"
 
 
 def scene_figure(scene: str, table: pl.DataFrame) -> Figure:

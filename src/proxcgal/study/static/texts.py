@@ -5,8 +5,7 @@ from collections.abc import Iterator
 from proxcgal.core.tables import in_metres
 from proxcgal.evaluation.metrics import SELF_LIMIT_M, Summary
 from proxcgal.study.bootstrap import ENOUGH
-from proxcgal.study.campaign import Listing
-from proxcgal.study.static.figures import memory_file, scene_file
+from proxcgal.study.campaign import Listing, file_name
 from proxcgal.study.static.memory_share import memory_rows, memory_sentences
 
 
@@ -126,9 +125,11 @@ def _sureness(paired: Summary) -> str:
 
 def captions(summary: Summary) -> dict[str, str]:
     """What the figures show."""
-    kinds = ((scene_file, _CAPTION), (memory_file, _MEMORY_CAPTION))
+    kinds = ((".png", _CAPTION), ("_memory.png", _MEMORY_CAPTION))
     return {
-        file(scene): f"{scene}: {caption}" for scene in summary["scenes"] for file, caption in kinds
+        file_name(scene + ending): f"{scene}: {caption}"
+        for scene in summary["scenes"]
+        for ending, caption in kinds
     }
 
 
