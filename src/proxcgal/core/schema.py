@@ -39,15 +39,18 @@ class Section(BaseModel):
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
 
 
-def core_table(struct: str, *, only: Sequence[str] = (), omit: Collection[str] = ()) -> Any:
+def core_table(
+    struct: str, *, only: Sequence[str] = (), omit: Collection[str] = (), **narrower: Any
+) -> Any:
     """Base of a table whose keys are the settings of a config struct of the core.
 
     Args:
         struct: its name in `_core.field_tables()`: keys, types, bounds, defaults, descriptions.
         only: these settings, in this order; empty for all.
         omit: settings that a file does not have.
+        narrower: further bounds of settings in a file, as pydantic names them.
     """
-    return table_from(struct, field_tables()[struct], only, omit)
+    return table_from(struct, field_tables()[struct], only, omit, **narrower)
 
 
 def core_key(struct: str, setting: str) -> Any:
@@ -71,11 +74,18 @@ def table_from(
     records: Sequence[FieldRecord],
     only: Sequence[str] = (),
     omit: Collection[str] = (),
+    **narrower: Any,
 ) -> type[Section]:
     """The same from a table of fields, such as another module's of its own."""
     every = {record.name: record for record in records if record.name not in omit}
     chosen = [every[name] for name in only or every]
-    keys: dict[str, Any] = {each.name: (_annotation(each), _field(each)) for each in chosen}
+    keys: dict[str, Any] = {
+        each.name: (
+            Annotated[_annotation(each), Field(**narrower.get(each.name, {}))],
+            _field(each),
+        )
+        for each in chosen
+    }
     return create_model(struct, __base__=Section, **keys)
 
 

@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from proxcgal.core.schema import Section, core_choice, core_key, core_table
+from proxcgal.core.schema import Positive, Section, core_choice, core_key, core_table
 
 SensedController = Literal["wb", "sm", "wb_memory"]
 TaskName = Literal[
@@ -65,7 +65,7 @@ class MinimumAltitudeKeys(core_table("MinimumAltitude")):
     """Task `minimum_altitude`."""
 
 
-class ManipulabilityKeys(core_table("Manipulability")):
+class ManipulabilityKeys(core_table("Manipulability", low={"gt": 0})):
     """Task `manipulability`."""
 
     @model_validator(mode="after")
@@ -75,7 +75,9 @@ class ManipulabilityKeys(core_table("Manipulability")):
         return self
 
 
-class ArmManipulabilityKeys(core_table("Manipulability", only=("target", "low", "high", "gain"))):
+class ArmManipulabilityKeys(
+    core_table("Manipulability", only=("target", "low", "high", "gain"), low={"gt": 0})
+):
     """Tasks `manipulability_macro` and `manipulability_micro`: one arm of two, normalised.
 
     The arm's manipulability counts as a share of the largest that 4000 random postures of the
@@ -90,7 +92,7 @@ class SelfCollisionKeys(core_table("SelfCollision", omit=("pairs",))):
 class ControllerKeys(Section):
     """The control law, the same for the whole body and for the sensor points."""
 
-    d_min: float = core_key("Avoidance", "d_min")
+    d_min: Positive = core_key("Avoidance", "d_min")
     buffer: float = core_key("Avoidance", "buffer")
     avoid_gain: float = core_key("Avoidance", "gain")
     nearest: int = core_key("Avoidance", "nearest")

@@ -9,7 +9,14 @@ class HumanKeys(core_table("OperatorCapsule")):
     """The operator's capsule, which rides on the tool and stands upright."""
 
 
-class IsoKeys(core_table("IsoSeparation")):
+class IsoKeys(
+    core_table(
+        "IsoSeparation",
+        intrusion={"ge": 0},
+        human_uncertainty={"ge": 0},
+        robot_uncertainty={"ge": 0},
+    )
+):
     """What the separation distance of ISO/TS 15066 is computed with, beside the threshold."""
 
 
