@@ -139,7 +139,7 @@ def written(arm_cell: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[P
     """A quick grid of the small arm, and what the command said."""
     folder = tmp_path_factory.mktemp("grid") / "out"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(timing_grid, "QUICK", EFFORT)
+        patch.setattr("proxcgal.study.timing.sweep.QUICK", EFFORT)
         said: list[str] = []
         patch.setattr("builtins.print", lambda *words, **_: said.append(" ".join(map(str, words))))
         command = ["sweep", "--quick", "--scenario", str(arm_cell), "--out", str(folder)]
