@@ -61,7 +61,7 @@ class Live:
         The button stays down. A page that draws slowly may not know yet that the mouse is there:
         then it is tried again.
         """
-        handle = self.server.scene._handle_from_transform_panel_name[HANDLE]
+        handle = self.server.scene._handle_from_transform_controls_name[HANDLE]
         mouse = self.tab.page.mouse
         for _ in range(4):
             R_WH = viser.transforms.SO3(np.asarray(handle.wxyz)).as_matrix()
