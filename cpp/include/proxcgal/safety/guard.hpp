@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "proxcgal/safety/torque_logic.hpp"
 #include "proxcgal/safety/separation.hpp"
+#include "proxcgal/safety/torque_logic.hpp"
 
 namespace proxcgal {
 
