@@ -46,8 +46,7 @@ int main(int argc, char** argv) {
     }
     for (const RetreatRow& row : one.retreats) {
       write(row.row);
-      std::printf(" %.17g %.17g %.17g %.17g", row.distance, row.d_min, row.gain,
-                  row.obstacle_rate);
+      std::printf(" %.17g %.17g %.17g %.17g", row.distance, row.d_min, row.gain, row.obstacle_rate);
     }
     std::printf(" %.17g %d", out.stand, static_cast<int>(out.status));
     write(out.qd);

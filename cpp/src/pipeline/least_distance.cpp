@@ -1,20 +1,19 @@
 #include "least_distance.hpp"
 
-#include <eiquadprog/eiquadprog-rt.hpp>
-
 #include <algorithm>
 #include <cmath>
+#include <eiquadprog/eiquadprog-rt.hpp>
 
 namespace proxcgal::detail {
 namespace {
 
-constexpr int kMaxIterations = 200;  // each drops at most as many rows as there are variables
-constexpr double kTiny = 1e-12;      // a row of a smaller norm is no row
+constexpr int kMaxIterations = 200;   // each drops at most as many rows as there are variables
+constexpr double kTiny = 1e-12;       // a row of a smaller norm is no row
 constexpr double kFarthestRow = 1e8;  // [-] a point farther off than this is not looked for
 constexpr double kViolation = 1e-10;  // accepted of a solution, in rows of unit norm
 // The solver stops where the violations sum up to less than
 // rows x epsilon x trace(H) x trace(J) x 100, and of H it reads the trace only.
-constexpr double kTrace = 1e-3;
+constexpr double kTrace = 1e-4;
 
 /// eiquadprog's real-time form: H = I is handed over as its inverse factor, and g = 0. With rows of
 /// unit norm the new diagonal of R is the norm of the step z, over 1.5e-8 where the row is taken,

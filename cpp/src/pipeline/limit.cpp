@@ -13,12 +13,14 @@ using detail::Bound;
 using detail::Levels;
 using detail::Programme;
 
-constexpr double kRounding = 1e-12;      // [m/s] a row that is missed by less is fulfilled
-constexpr double kFar = 1e6;             // rows and velocities beyond are no input
-constexpr double kContradictory = 0.5;   // contradiction above which the nominal is reduced ...
-constexpr double kBlocked = 0.8;         // ... and above which it is taken off
+constexpr double kRounding = 1e-12;       // [m/s] a row that is missed by less is fulfilled
+constexpr double kKept = 5e-10;           // [m/s] violation of a cap that is left alone
+constexpr double kFar = 1e6;              // rows and velocities beyond are no input
+constexpr double kContradictory = 0.5;    // contradiction above which the nominal is reduced ...
+constexpr double kBlocked = 0.8;          // ... and above which it is taken off
 constexpr double kStandViolation = 0.02;  // [m/s] violation at which it is taken off
-constexpr double kPinched = 0.5;          // of `stand`
+constexpr std::array kRelax{1e-11, 1e-9, 1e-7};  // [m/s]
+constexpr double kPinched = 0.5;                 // of `stand`
 
 bool usable(const JointVector& v, Eigen::Index n) {
   return v.size() == n && v.allFinite() && (v.size() == 0 || v.cwiseAbs().maxCoeff() <= kFar);
@@ -52,10 +54,14 @@ struct Limiter::Impl {
   double reaction = 0.0, braking_time = 0.0;
 
   Impl(const Limits& l, const LimitConfig& c, double p)
-      : limits(l), config(c), period(p), bound(p, c.period_margin),
+      : limits(l),
+        config(c),
+        period(p),
+        bound(p, c.period_margin),
         levels(static_cast<int>(l.qd_max.size())) {
     const auto n = limits.qd_max.size();
-    out.qd = out.qd_brake = candidate = target = clamped = executed = overrun = JointVector::Zero(n);
+    out.qd = out.qd_brake = candidate = target = clamped = executed = overrun =
+        JointVector::Zero(n);
   }
 
   /// (0), the braking command and the times of (1).
@@ -124,11 +130,12 @@ struct Limiter::Impl {
     const auto fulfilled = [&](const Bound& row) {
       return !row.binds || row.row->dot(qd) >= row.least - kRounding;
     };
-    return std::all_of(in.caps.begin(), in.caps.end(), [&](const ApproachCap& cap) {
-             return cap.row.dot(qd) >= cap_least(cap) - kRounding;
-           }) &&
-           std::all_of(programme.retreats.begin(), programme.retreats.begin() +
-                       programme.n_retreats, fulfilled);
+    return std::all_of(in.caps.begin(), in.caps.end(),
+                       [&](const ApproachCap& cap) {
+                         return cap.row.dot(qd) >= cap_least(cap) - kRounding;
+                       }) &&
+           std::all_of(programme.retreats.begin(),
+                       programme.retreats.begin() + programme.n_retreats, fulfilled);
   }
 
   /// From the braking command towards `qd`, as far as every cap allows: what the solver's rounding
@@ -139,7 +146,7 @@ struct Limiter::Impl {
     for (const ApproachCap& cap : in.caps) {
       const double bound = cap_least(cap);
       const double rate = cap.row.dot(qd);
-      if (rate >= bound - kRounding) continue;
+      if (rate >= bound - kKept) continue;
       const double braking = cap.row.dot(programme.qd_brake);
       s = std::min(s, std::max(0.0, braking - bound) / (braking - rate));
     }
@@ -176,36 +183,41 @@ struct Limiter::Impl {
     // (2a)
     clamped = in.nominal.cwiseMax(programme.interval.low).cwiseMin(programme.interval.high);
     if (!levels.least_violation(programme, clamped, candidate)) return;
-    keep_caps(in, candidate);
     out.qd = candidate;
+    keep_caps(in, out.qd);
     out.status = LimitStatus::kPartly;
     double t = 0.0;
     for (std::size_t k = 0; k < n_rows; ++k) {
       const Bound& row = programme.retreats[k];
-      if (row.binds)
-        t = std::max(t, row.least - programme.allowance[k] - row.row->dot(candidate));
+      if (row.binds) t = std::max(t, row.least - programme.allowance[k] - row.row->dot(candidate));
     }
     out.violation = t;
     // (2b)
     if (!levels.least_squares(programme, clamped, t, candidate)) return;
     out.contradiction = levels.contradiction(programme, candidate);
-    keep_caps(in, candidate);
     out.qd = candidate;
+    keep_caps(in, out.qd);
     double worst = 0.0;
     for (std::size_t k = 0; k < n_rows; ++k) {
       const double rate = programme.retreats[k].row->dot(candidate);
       worst = std::max(worst, programme.retreats[k].least - rate);
-      rates[k] = std::min(rates[k], rate - 1e-11);
+      rates[k] = std::min(rates[k], rate);
     }
-    out.stand = ramp(out.contradiction, kContradictory, kBlocked) *
-                ramp(worst, 0.0, kStandViolation);
+    out.stand =
+        ramp(out.contradiction, kContradictory, kBlocked) * ramp(worst, 0.0, kStandViolation);
     out.pinched = out.stand > kPinched;
     // (3)
     target = (1.0 - out.stand) * in.nominal;
-    if (!levels.nearest(programme, target, rates, candidate)) return;
-    keep_caps(in, candidate);
-    out.qd = candidate;
-    out.status = LimitStatus::kLimited;
+    // The rates that (2b) leaves hold all but with equality: they give way by its rounding.
+    for (const double relax : kRelax) {
+      std::array<double, kMaxRetreats> relaxed = rates;
+      for (std::size_t k = 0; k < n_rows; ++k) relaxed[k] -= relax;
+      if (!levels.nearest(programme, target, relaxed, candidate)) continue;
+      keep_caps(in, candidate);
+      out.qd = candidate;
+      out.status = LimitStatus::kLimited;
+      return;
+    }
   }
 
   void begin() {
@@ -229,9 +241,9 @@ struct Limiter::Impl {
     for (int i = 0; i < programme.n_retreats; ++i) {
       const auto k = static_cast<std::size_t>(i);
       const double rate = programme.retreats[k].least;
-      out.share[k] =
-          rate > kRounding
-              ? std::clamp(programme.retreats[k].row->dot(out.qd) / rate, 0.0, 1.0) : 1.0;
+      out.share[k] = rate > kRounding
+                         ? std::clamp(programme.retreats[k].row->dot(out.qd) / rate, 0.0, 1.0)
+                         : 1.0;
     }
     if (out.status != LimitStatus::kLimited) return;
     const auto& solver = levels.joints();
@@ -258,9 +270,9 @@ struct Limiter::Impl {
 Limiter::Limiter(const Limits& limits, const LimitConfig& config, double period) {
   config.validate();
   const auto n = limits.qd_max.size();
-  require(n > 0 && limits.q_min.size() == n && limits.q_max.size() == n &&
-              limits.qdd_max.size() == n,
-          "joints of the limits", n, "above 0 and the same in all four");
+  require(
+      n > 0 && limits.q_min.size() == n && limits.q_max.size() == n && limits.qdd_max.size() == n,
+      "joints of the limits", n, "above 0 and the same in all four");
   require(limits.qd_max.allFinite() && (limits.qd_max.array() >= 0.0).all(), "qd_max",
           limits.qd_max.transpose(), "finite and at least 0");
   require(limits.qdd_max.allFinite() && (limits.qdd_max.array() > 0.0).all(), "qdd_max",

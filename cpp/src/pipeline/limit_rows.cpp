@@ -8,11 +8,11 @@
 namespace proxcgal {
 namespace {
 
-constexpr double kForget = 0.97;         // of a long interval a tick
-constexpr double kLongestPeriod = 0.5;   // [s] a longer interval is a fault of the clock
-constexpr double kRetreatRise = 20.0;    // [1/s] of the bound on retreat beyond d_stop
-constexpr double kContactSpeed = 0.5;    // [m/s] assumed approach in the time to contact
-constexpr double kContactTime = 0.25;    // [s] at which a row's weight is half
+constexpr double kForget = 0.97;        // of a long interval a tick
+constexpr double kLongestPeriod = 0.5;  // [s] a longer interval is a fault of the clock
+constexpr double kRetreatRise = 20.0;   // [1/s] of the bound on retreat beyond d_stop
+constexpr double kContactSpeed = 0.5;   // [m/s] assumed approach in the time to contact
+constexpr double kContactTime = 0.25;   // [s] at which a row's weight is half
 
 }  // namespace
 
@@ -87,10 +87,10 @@ void joint_interval(const Limits& limits, const JointVector& q, const JointVecto
   const double window = std::clamp(elapsed, 0.0, max_period);
   for (Eigen::Index j = 0; j < n; ++j) {
     const double a = limits.qdd_max[j];
-    const double low = -std::min(limits.qd_max[j],
-                                 viable_speed(q[j] - limits.q_min[j], a, max_period));
-    const double high = std::min(limits.qd_max[j],
-                                 viable_speed(limits.q_max[j] - q[j], a, max_period));
+    const double low =
+        -std::min(limits.qd_max[j], viable_speed(q[j] - limits.q_min[j], a, max_period));
+    const double high =
+        std::min(limits.qd_max[j], viable_speed(limits.q_max[j] - q[j], a, max_period));
     out.low[j] = std::clamp(low, qd_last[j] - a * window, qd_last[j] + a * window);
     out.high[j] = std::clamp(high, qd_last[j] - a * window, qd_last[j] + a * window);
   }
@@ -114,8 +114,8 @@ double approach_speed(const LimitConfig& config, double distance, double reactio
   if (!(beyond > 0.0)) return std::min(c, config.near_speed);
   // c reaction + (c^2 - near_speed^2) / (2 a) = beyond, a = c / braking_time.
   const double v = config.near_speed;
-  const double to_near = (beyond + std::sqrt(beyond * beyond + 2.0 * T * braking_time * v * v)) /
-                         (2.0 * T);
+  const double to_near =
+      (beyond + std::sqrt(beyond * beyond + 2.0 * T * braking_time * v * v)) / (2.0 * T);
   return std::min(c, std::max(v, to_near));
 }
 

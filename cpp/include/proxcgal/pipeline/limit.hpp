@@ -10,18 +10,18 @@ namespace proxcgal {
 
 /// Settings of the limit stage.
 struct LimitConfig {
-  bool distances = true;          ///< levels (1) and (2); without them joint limits only
-  double d_stop = 0.05;           ///< [m] no approach nearer than this
-  double near_distance = 0.10;    ///< [m] nearer than this the arm approaches at near_speed at most
-  double near_speed = 0.05;       ///< [m/s]
-  double retreat_speed = 0.25;    ///< [m/s] fastest retreat nearer than d_stop
-  double joint_state_age = 0.0;   ///< [s] age of the joint state at the tick
-  double dead_time = 0.0;         ///< [s] from a command to its first effect
-  double lag = 0.0;               ///< [s] time constant of the arm's velocity loop
-  double scan_latency = 0.0;      ///< [s] nominal, from measurement to tick: in the caps only
-  double period_margin = 1.5;     ///< max_period over the longest recent interval
-  double level_ratio = 0.1;       ///< weight of a level of (3) over the one above it
-  double least_weight = 1e-3;     ///< eps of (3), and the least weight of a level
+  bool distances = true;         ///< levels (1) and (2); without them joint limits only
+  double d_stop = 0.05;          ///< [m] no approach nearer than this
+  double near_distance = 0.10;   ///< [m] nearer than this the arm approaches at near_speed at most
+  double near_speed = 0.05;      ///< [m/s]
+  double retreat_speed = 0.25;   ///< [m/s] fastest retreat nearer than d_stop
+  double joint_state_age = 0.0;  ///< [s] age of the joint state at the tick
+  double dead_time = 0.0;        ///< [s] from a command to its first effect
+  double lag = 0.0;              ///< [s] time constant of the arm's velocity loop
+  double scan_latency = 0.0;     ///< [s] nominal, from measurement to tick: in the caps only
+  double period_margin = 1.5;    ///< max_period over the longest recent interval
+  double level_ratio = 0.1;      ///< weight of a level of (3) over the one above it
+  double least_weight = 1e-3;    ///< eps of (3), and the least weight of a level
 
   /// The papers' law within the joints' limits.
   static LimitConfig papers() { return {.distances = false}; }
@@ -130,15 +130,15 @@ struct LimitInput {
 /// A row that changed the command.
 struct ActiveLimit {
   LimitKind kind = LimitKind::kJoint;
-  int link = -1;            ///< or joint
-  double distance = 0.0;    ///< [m]; infinite for a joint
-  double rate = 0.0;        ///< row qd of the command [m/s]; the joint's velocity
+  int link = -1;          ///< or joint
+  double distance = 0.0;  ///< [m]; infinite for a joint
+  double rate = 0.0;      ///< row qd of the command [m/s]; the joint's velocity
 };
 
 enum class LimitStatus : std::uint8_t {
   kUnchanged,  ///< the nominal, bit for bit
   kLimited,
-  kPartly,  ///< a programme failed: the last level that was solved
+  kPartly,   ///< a programme failed: the last level that was solved
   kBraking,  ///< input not finite or of the wrong size, or no programme solved: all joints brake
 };
 
@@ -154,10 +154,10 @@ struct LimitOutput {
   /// Share of the retreat demands that one another and the caps block, and not the joints; [0, 1].
   double contradiction = 0.0;
   bool pinched = false;
-  double stand = 0.0;     ///< in [0, 1]: taken off the nominal where pinched
+  double stand = 0.0;      ///< in [0, 1]: taken off the nominal where pinched
   double violation = 0.0;  ///< t of (2a) [m/s]
-  int programmes = 0;     ///< solved in this call
-  int iterations = 0;     ///< of all of them
+  int programmes = 0;      ///< solved in this call
+  int iterations = 0;      ///< of all of them
 
   std::span<const ActiveLimit> limited() const {
     return {active.data(), static_cast<std::size_t>(n_active)};
