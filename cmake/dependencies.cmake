@@ -24,5 +24,6 @@ list(PREPEND proxcgal_cmeel_prefixes ${CMAKE_PREFIX_PATH} ${proxcgal_environment
 list(TRANSFORM proxcgal_cmeel_prefixes APPEND /cmeel.prefix/include)
 find_path(EIQUADPROG_INCLUDE_DIR eiquadprog/eiquadprog-rt.hpp HINTS ${proxcgal_cmeel_prefixes}
           REQUIRED)
-add_library(proxcgal_eiquadprog INTERFACE)
-target_include_directories(proxcgal_eiquadprog SYSTEM INTERFACE ${EIQUADPROG_INCLUDE_DIR})
+# For the one file that needs it: that prefix may hold a Boost too, which CGAL must not take.
+set_source_files_properties(cpp/src/pipeline/least_distance.cpp
+                            PROPERTIES COMPILE_OPTIONS "-isystem;${EIQUADPROG_INCLUDE_DIR}")
