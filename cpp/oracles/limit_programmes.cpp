@@ -27,7 +27,7 @@ int main(int argc, char** argv) {
     const test::LimitCase one = test::any_case(random, trial);
     const auto n = one.q.size();
     Limiter limiter(one.limits, config, 0.01);
-    const LimitOutput& out = limiter.limit(one.input());
+    const LimitOutput& out = one.through(limiter);
     Eigen::MatrixXd W = config.least_weight * Eigen::MatrixXd::Identity(n, n);
     double weight = 1.0;
     for (const Task& task : one.tasks) {
@@ -35,10 +35,10 @@ int main(int argc, char** argv) {
       weight *= config.level_ratio;
     }
     std::printf("%d %zu %zu", static_cast<int>(n), one.caps.size(), one.retreats.size());
-    write(out.interval.low);
-    write(out.interval.high);
+    write(limiter.state().interval.low);
+    write(limiter.state().interval.high);
     write(one.nominal);
-    write(out.qd_brake);
+    write(limiter.state().qd_brake);
     write(W.reshaped());
     for (const ApproachCap& cap : one.caps) {
       write(cap.row);

@@ -41,7 +41,7 @@ NB_MODULE(_core, m) {
   bind_pipeline(m);
   bind_solve(m);
   bind_task(m);
-  bind_command(m);
+  bind_limit(m);
   bind_config(m);
   bind_output(m);
   bind_controller(m);

@@ -66,8 +66,11 @@ void TrustedDistance::of_sensed(double time, const Posture& posture, const Perce
   }
   if (!out.pair) return;
   const Vector3 apart = out.pair->surface_W - out.pair->obstacle_W;
-  if (!perception.in_contact()) {
-    if (apart.norm() > kTouching) outward_W_ = apart.normalized();
+  if (!perception.in_contact(perception.origins()[static_cast<std::size_t>(out.pair->point)])) {
+    const Pose& T_WL = posture.T_WL[static_cast<std::size_t>(out.pair->link)];
+    const bool inside = robot_.tree(out.pair->link).inside(into(T_WL, out.pair->obstacle_W));
+    if (inside) out.trusted_distance = -out.pair->distance;
+    if (apart.norm() > kTouching) outward_W_ = apart.normalized() * (inside ? -1.0 : 1.0);
     return;
   }
   monitor.add({.reason = Reason::kContact, .link = out.pair->link});
@@ -96,7 +99,7 @@ void TrustedDistance::watch(double time, const TickOutput& out, Perception& perc
   perception.hold(believed && out.pair_remembered ? out.pair->point : -1);
   // No zone shows what is remembered: there is none to watch.
   if (believed && !out.pair_remembered) {
-    perception.watch({out.pair_origin, out.pair->obstacle_W});
+    perception.watch({out.pair_origin, out.pair->obstacle_W, perception.stamp(out.pair->point)});
   } else {
     perception.watch({});
   }

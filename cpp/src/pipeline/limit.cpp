@@ -4,12 +4,12 @@
 #include <cmath>
 
 #include "limit_levels.hpp"
-#include "require.hpp"
+#include "proxcgal/error.hpp"
 
 namespace proxcgal {
 namespace {
 
-using detail::Bound;
+using detail::BoundRow;
 using detail::Levels;
 using detail::Programme;
 
@@ -43,67 +43,66 @@ double ramp(double x, double from, double to) {
 struct Limiter::Impl {
   Limits limits;
   LimitConfig config;
-  double period;
   PeriodBound bound;
   Levels levels;
+  LimitState state;
   Programme programme;
   LimitOutput out;
   JointVector candidate, target, clamped;
   JointVector executed;  // velocity of an arm that follows with a lag of dead time + lag
   JointVector overrun;   // how far it still moves beyond what the last command says
-  double reaction = 0.0, braking_time = 0.0;
 
-  Impl(const Limits& l, const LimitConfig& c, double p)
+  Impl(const Limits& l, const LimitConfig& c, double period)
       : limits(l),
         config(c),
-        period(p),
-        bound(p, c.period_margin),
+        bound(period, c.period_margin),
         levels(static_cast<int>(l.qd_max.size())) {
     const auto n = limits.qd_max.size();
-    out.qd = out.qd_brake = candidate = target = clamped = executed = overrun =
-        JointVector::Zero(n);
+    out.qd = candidate = target = clamped = executed = overrun = JointVector::Zero(n);
+    state.qd_brake = state.interval.low = state.interval.high = out.qd;
+    programme.state = &state;
   }
+  Impl(const Impl&) = delete;
 
   /// (0), the braking command and the times of (1).
-  void reckon(const JointVector& q, const JointVector& qd_last, double elapsed) {
+  void reckon(const JointVector& q, const JointVector& qd_last, double elapsed,
+              double joint_state_age) {
     bound.update(elapsed);
     const double D = bound.value();
-    joint_interval(limits, q, qd_last, elapsed, D, programme.interval);
-    brake_together(limits, qd_last, std::min(elapsed, D), programme.interval, programme.qd_brake);
+    joint_interval(limits, q, qd_last, elapsed, D, state.interval);
+    brake_together(limits, qd_last, std::min(elapsed, D), state.interval, state.qd_brake);
     // The command of this tick brakes to rest within the last one's time and the time passed: no
     // joint gains more than qdd_max elapsed.
     const double window = std::clamp(elapsed, 0.0, D);
-    braking_time = (qd_last.cwiseAbs().array() / limits.qdd_max.array()).maxCoeff() + window;
-    reaction = config.joint_state_age + D + config.dead_time + config.lag + config.scan_latency;
+    state.braking_time = (qd_last.cwiseAbs().array() / limits.qdd_max.array()).maxCoeff() + window;
+    state.reaction = std::max(config.joint_state_age, joint_state_age) + D + config.dead_time +
+                     config.lag + config.scan_latency;
     const double follows = config.dead_time + config.lag;
     const double share = follows > 0.0 ? -std::expm1(-window / follows) : 1.0;
     executed += share * (qd_last - executed);
     overrun = follows * (executed - qd_last);
-    out.interval = programme.interval;
-    out.qd_brake = programme.qd_brake;
   }
 
   double cap_least(const ApproachCap& cap) const {
     // c (dead time + lag) is in (1) for an arm that moves as commanded. One that still moves faster
     // closes the distance by more.
-    const double distance = cap.distance - std::max(0.0, -cap.row.dot(overrun));
-    const double c = std::min(approach_speed(config, distance, reaction, braking_time),
-                              std::max(0.0, cap.speed));
+    ApproachCap nearer = cap;
+    nearer.distance -= std::max(0.0, -cap.row.dot(overrun));
+    const double c = std::max(0.0, approach_speed(config, nearer, state.reaction, state.braking_time));
     // (1) row qd >= min(-c, row qd_brake): the braking command fulfils it, whatever the row is.
-    return std::min(-c, cap.row.dot(programme.qd_brake));
+    return std::min(-c, cap.row.dot(state.qd_brake));
   }
 
   bool read(const LimitInput& in) {
     const auto n = limits.qd_max.size();
     if (!usable(in.nominal, n)) return false;
     programme.n_caps = programme.n_retreats = 0;
-    if (!config.distances) return true;
     for (const ApproachCap& cap : in.caps) {
       if (!usable(cap.row, n) || std::isnan(cap.distance) || std::isnan(cap.speed)) return false;
       if (programme.n_caps == kMaxCaps) continue;  // `keep_caps` sees to it
-      Bound& row = programme.caps[static_cast<std::size_t>(programme.n_caps)];
+      BoundRow& row = programme.caps[static_cast<std::size_t>(programme.n_caps)];
       row = {.row = &cap.row, .least = cap_least(cap)};
-      row.binds = least(cap.row, programme.interval) < row.least;
+      row.binds = least(cap.row, state.interval) < row.least;
       if (row.binds) ++programme.n_caps;
     }
     for (const RetreatRow& retreat : in.retreats) {
@@ -111,9 +110,9 @@ struct Limiter::Impl {
       const double rate = retreat_rate(config, retreat);
       if (!usable(retreat.row, n) || std::isnan(rate) || rate > kFar) return false;
       const auto k = static_cast<std::size_t>(programme.n_retreats++);
-      Bound& row = programme.retreats[k];
+      BoundRow& row = programme.retreats[k];
       row = {.row = &retreat.row, .least = rate};
-      row.binds = least(retreat.row, programme.interval) < rate;
+      row.binds = least(retreat.row, state.interval) < rate;
       programme.weight[k] = retreat_weight(retreat);
       programme.allowance[k] =
           std::max(0.0, retreat.gain) * std::max(0.0, retreat.distance - config.d_stop);
@@ -123,11 +122,10 @@ struct Limiter::Impl {
 
   bool admissible(const LimitInput& in) const {
     const JointVector& qd = in.nominal;
-    if ((qd.array() < programme.interval.low.array()).any() ||
-        (qd.array() > programme.interval.high.array()).any())
+    if ((qd.array() < state.interval.low.array()).any() ||
+        (qd.array() > state.interval.high.array()).any())
       return false;
-    if (!config.distances) return true;
-    const auto fulfilled = [&](const Bound& row) {
+    const auto fulfilled = [&](const BoundRow& row) {
       return !row.binds || row.row->dot(qd) >= row.least - kRounding;
     };
     return std::all_of(in.caps.begin(), in.caps.end(),
@@ -141,25 +139,24 @@ struct Limiter::Impl {
   /// From the braking command towards `qd`, as far as every cap allows: what the solver's rounding
   /// left, and the caps beyond kMaxCaps.
   void keep_caps(const LimitInput& in, JointVector& qd) const {
-    if (!config.distances) return;
     double s = 1.0;
     for (const ApproachCap& cap : in.caps) {
       const double bound = cap_least(cap);
       const double rate = cap.row.dot(qd);
       if (rate >= bound - kKept) continue;
-      const double braking = cap.row.dot(programme.qd_brake);
+      const double braking = cap.row.dot(state.qd_brake);
       s = std::min(s, std::max(0.0, braking - bound) / (braking - rate));
     }
     if (s >= 1.0) return;
-    qd = programme.qd_brake + s * (qd - programme.qd_brake);
-    qd = qd.cwiseMax(programme.interval.low).cwiseMin(programme.interval.high);
+    qd = state.qd_brake + s * (qd - state.qd_brake);
+    qd = qd.cwiseMax(state.interval.low).cwiseMin(state.interval.high);
   }
 
   /// Could every retreat row have its rate, each for itself?
   bool attainable() const {
     for (int i = 0; i < programme.n_retreats; ++i) {
-      const Bound& row = programme.retreats[static_cast<std::size_t>(i)];
-      if (largest(*row.row, programme.interval) < row.least) return false;
+      const BoundRow& row = programme.retreats[static_cast<std::size_t>(i)];
+      if (largest(*row.row, state.interval) < row.least) return false;
     }
     return true;
   }
@@ -177,18 +174,18 @@ struct Limiter::Impl {
       out.qd = candidate;
       return;
     }
-    out.qd = programme.qd_brake;
+    out.qd = state.qd_brake;
     out.status = LimitStatus::kBraking;
     if (n_rows == 0) return;
     // (2a)
-    clamped = in.nominal.cwiseMax(programme.interval.low).cwiseMin(programme.interval.high);
+    clamped = in.nominal.cwiseMax(state.interval.low).cwiseMin(state.interval.high);
     if (!levels.least_violation(programme, clamped, candidate)) return;
     out.qd = candidate;
     keep_caps(in, out.qd);
     out.status = LimitStatus::kPartly;
     double t = 0.0;
     for (std::size_t k = 0; k < n_rows; ++k) {
-      const Bound& row = programme.retreats[k];
+      const BoundRow& row = programme.retreats[k];
       if (row.binds) t = std::max(t, row.least - programme.allowance[k] - row.row->dot(candidate));
     }
     out.violation = t;
@@ -252,14 +249,14 @@ struct Limiter::Impl {
         note(LimitKind::kJoint, j, kInfinity, out.qd[j]);
     }
     for (int i = 0; i < programme.n_caps; ++i) {
-      const Bound& row = programme.caps[static_cast<std::size_t>(i)];
+      const BoundRow& row = programme.caps[static_cast<std::size_t>(i)];
       if (!solver.holds(row.at)) continue;
       const ApproachCap* cap = &in.caps.front();
       while (&cap->row != row.row) ++cap;
       note(cap->kind, cap->link, cap->distance, row.row->dot(out.qd));
     }
     for (int i = 0; i < programme.n_retreats; ++i) {
-      const Bound& row = programme.retreats[static_cast<std::size_t>(i)];
+      const BoundRow& row = programme.retreats[static_cast<std::size_t>(i)];
       const RetreatRow& retreat = in.retreats[static_cast<std::size_t>(i)];
       if (solver.holds(row.at))
         note(retreat.kind, retreat.link, retreat.distance, row.row->dot(out.qd));
@@ -268,7 +265,7 @@ struct Limiter::Impl {
 };
 
 Limiter::Limiter(const Limits& limits, const LimitConfig& config, double period) {
-  config.validate();
+  validate(config);
   const auto n = limits.qd_max.size();
   require(
       n > 0 && limits.q_min.size() == n && limits.q_max.size() == n && limits.qdd_max.size() == n,
@@ -284,18 +281,24 @@ Limiter::~Limiter() = default;
 Limiter::Limiter(Limiter&&) noexcept = default;
 Limiter& Limiter::operator=(Limiter&&) noexcept = default;
 
-const LimitOutput& Limiter::limit(const LimitInput& in) {
+const LimitState& Limiter::begin(const JointVector& q, const JointVector& qd_last, double elapsed,
+                                 double joint_state_age) {
   Impl& me = *impl_;
   const auto n = me.limits.qd_max.size();
-  if (!usable(in.q, n) || !usable(in.qd_last, n) || !std::isfinite(in.elapsed)) {
-    me.begin();
-    me.out.qd.setZero();  // nothing is known that a braking command could start from
-    return me.out;
-  }
   me.begin();
-  me.reckon(in.q, in.qd_last, in.elapsed);
-  me.out.qd = me.programme.qd_brake;
-  if (!me.read(in)) return me.out;
+  me.state.usable = q.size() == n && q.allFinite() && usable(qd_last, n) && std::isfinite(elapsed) &&
+                    std::isfinite(joint_state_age);
+  // Where nothing is known there is nothing that a braking command could start from.
+  me.out.qd.setZero();
+  if (!me.state.usable) return me.state;
+  me.reckon(q, qd_last, elapsed, joint_state_age);
+  me.out.qd = me.state.qd_brake;
+  return me.state;
+}
+
+const LimitOutput& Limiter::limit(const LimitInput& in) {
+  Impl& me = *impl_;
+  if (!me.state.usable || !me.read(in)) return me.out;
   if (me.admissible(in)) {
     me.out.qd = in.nominal;
     me.out.status = LimitStatus::kUnchanged;
@@ -306,19 +309,13 @@ const LimitOutput& Limiter::limit(const LimitInput& in) {
   return me.out;
 }
 
-const LimitOutput& Limiter::brake(const JointVector& q, const JointVector& qd_last,
-                                  double elapsed) {
+const LimitOutput& Limiter::brake() {
   Impl& me = *impl_;
-  const auto n = me.limits.qd_max.size();
   me.begin();
-  if (!usable(q, n) || !usable(qd_last, n) || !std::isfinite(elapsed)) {
-    me.out.qd.setZero();
-    return me.out;
-  }
-  me.reckon(q, qd_last, elapsed);
-  me.out.qd = me.programme.qd_brake;
+  if (me.state.usable) me.out.qd = me.state.qd_brake;
   return me.out;
 }
+const LimitState& Limiter::state() const { return impl_->state; }
 
 const LimitConfig& Limiter::config() const { return impl_->config; }
 double Limiter::max_period() const { return impl_->bound.value(); }

@@ -32,12 +32,12 @@ void Levels::begin(LeastDistance& solver, int variables, Programme& programme,
     const auto k = static_cast<std::size_t>(j);
     scratch_.setZero(n_);
     scratch_[j] = 1.0;
-    at_low_[k] = solver.add(scratch_, scale * (programme.interval.low[j] - centre[j]));
+    at_low_[k] = solver.add(scratch_, scale * (programme.state->interval.low[j] - centre[j]));
     scratch_[j] = -1.0;
-    at_high_[k] = solver.add(scratch_, scale * (centre[j] - programme.interval.high[j]));
+    at_high_[k] = solver.add(scratch_, scale * (centre[j] - programme.state->interval.high[j]));
   }
   for (int i = 0; i < programme.n_caps; ++i) {
-    Bound& cap = programme.caps[static_cast<std::size_t>(i)];
+    BoundRow& cap = programme.caps[static_cast<std::size_t>(i)];
     if (!cap.binds) continue;
     scratch_ = *cap.row / scale;
     cap.at = solver.add(scratch_, cap.least - cap.row->dot(centre));
@@ -51,7 +51,7 @@ bool Levels::finish(LeastDistance& solver, const Programme& programme, const Joi
   ++solved;
   if (!found) return false;
   for (int j = 0; j < n_; ++j) scratch_[j] = centre[j] + solver.y(j) / scale;
-  qd = scratch_.cwiseMax(programme.interval.low).cwiseMin(programme.interval.high);
+  qd = scratch_.cwiseMax(programme.state->interval.low).cwiseMin(programme.state->interval.high);
   return true;
 }
 
@@ -61,7 +61,7 @@ bool Levels::least_violation(Programme& programme, const JointVector& near, Join
   begin(*slacks_, n_ + 1, programme, near, scale);
   for (int i = 0; i < programme.n_retreats; ++i) {
     const auto k = static_cast<std::size_t>(i);
-    const Bound& retreat = programme.retreats[k];
+    const BoundRow& retreat = programme.retreats[k];
     if (!retreat.binds) continue;
     scratch_ = *retreat.row / scale;
     slacks_->add(scratch_, n_, 1.0,
@@ -78,7 +78,7 @@ bool Levels::least_squares(Programme& programme, const JointVector& near, double
   begin(*slacks_, n_ + programme.n_retreats, programme, near, scale);
   for (int i = 0; i < programme.n_retreats; ++i) {
     const auto k = static_cast<std::size_t>(i);
-    Bound& retreat = programme.retreats[k];
+    BoundRow& retreat = programme.retreats[k];
     retreat.at = at_most_[k] = -1;
     if (!retreat.binds) continue;
     scratch_ = *retreat.row / scale;
@@ -96,7 +96,7 @@ double Levels::contradiction(const Programme& programme, const JointVector& qd) 
   double demand = 0.0;
   for (int i = 0; i < programme.n_retreats; ++i) {
     const auto k = static_cast<std::size_t>(i);
-    const Bound& retreat = programme.retreats[k];
+    const BoundRow& retreat = programme.retreats[k];
     if (!retreat.binds) continue;
     const double missing = std::max(0.0, retreat.least - retreat.row->dot(qd));
     const double force = programme.weight[k] * missing + slacks_->multiplier(at_most_[k]);
@@ -105,7 +105,7 @@ double Levels::contradiction(const Programme& programme, const JointVector& qd) 
   }
   if (!(demand > 0.0)) return 0.0;
   for (int i = 0; i < programme.n_caps; ++i) {
-    const Bound& cap = programme.caps[static_cast<std::size_t>(i)];
+    const BoundRow& cap = programme.caps[static_cast<std::size_t>(i)];
     if (cap.binds) pull += slacks_->multiplier(cap.at) * *cap.row;
   }
   return std::clamp(1.0 - pull.norm() / demand, 0.0, 1.0);
@@ -140,18 +140,18 @@ bool Levels::nearest(Programme& programme, const JointVector& target,
   for (int j = 0; j < n_; ++j) {
     const auto k = static_cast<std::size_t>(j);
     scratch_ = L_inverse_.col(j);
-    at_low_[k] = joints_->add(scratch_, programme.interval.low[j] - target[j]);
+    at_low_[k] = joints_->add(scratch_, programme.state->interval.low[j] - target[j]);
     scratch_ = -scratch_;
-    at_high_[k] = joints_->add(scratch_, target[j] - programme.interval.high[j]);
+    at_high_[k] = joints_->add(scratch_, target[j] - programme.state->interval.high[j]);
   }
-  const auto add = [&](Bound& bound, double rate) {
+  const auto add = [&](BoundRow& bound, double rate) {
     bound.at = -1;
     if (!bound.binds) return;
     scratch_.noalias() = L_inverse_.triangularView<Eigen::Lower>() * *bound.row;
     bound.at = joints_->add(scratch_, rate - bound.row->dot(target));
   };
   for (int i = 0; i < programme.n_caps; ++i) {
-    Bound& cap = programme.caps[static_cast<std::size_t>(i)];
+    BoundRow& cap = programme.caps[static_cast<std::size_t>(i)];
     add(cap, cap.least);
   }
   for (int i = 0; i < programme.n_retreats; ++i) {
@@ -166,7 +166,7 @@ bool Levels::nearest(Programme& programme, const JointVector& target,
   for (int j = 0; j < n_; ++j) y[j] = joints_->y(j);
   scratch_.noalias() = L_inverse_.transpose() * y;
   scratch_ += target;
-  qd = scratch_.cwiseMax(programme.interval.low).cwiseMin(programme.interval.high);
+  qd = scratch_.cwiseMax(programme.state->interval.low).cwiseMin(programme.state->interval.high);
   return true;
 }
 

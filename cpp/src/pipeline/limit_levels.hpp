@@ -8,7 +8,7 @@
 namespace proxcgal::detail {
 
 /// A row as the programmes take it: row qd >= least.
-struct Bound {
+struct BoundRow {
   const JointVector* row = nullptr;
   double least = 0.0;
   bool binds = false;  ///< some velocity in the interval violates it
@@ -17,11 +17,10 @@ struct Bound {
 
 /// What the programmes of one tick share.
 struct Programme {
-  JointInterval interval;  ///< (0)
-  JointVector qd_brake;    ///< fulfils (0) and (1)
-  std::array<Bound, kMaxCaps> caps;
+  const LimitState* state = nullptr;
+  std::array<BoundRow, kMaxCaps> caps;
   int n_caps = 0;
-  std::array<Bound, kMaxRetreats> retreats;  ///< least: the rate
+  std::array<BoundRow, kMaxRetreats> retreats;  ///< least: the rate
   std::array<double, kMaxRetreats> weight, allowance;
   int n_retreats = 0;
 };

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "proxcgal/pipeline/limit.hpp"
-#include "require.hpp"
+#include "proxcgal/error.hpp"
 
 namespace proxcgal {
 namespace {
@@ -26,29 +26,10 @@ double viable_speed(double room, double a, double D) {
   return a * D * (k + (steps - 0.5 * k * (k + 1.0)) / (k + 1.0));
 }
 
-void LimitConfig::validate() const {
-  const auto finite = [](double value) { return std::isfinite(value); };
-  const auto positive = [](const char* field, double value) {
-    require(std::isfinite(value) && value > 0.0, field, value, "finite and above 0");
-  };
-  const auto delay = [](const char* field, double value) {
-    require(value >= 0.0 && value <= 1.0, field, value, "between 0 and 1 s");
-  };
-  require(finite(d_stop) && d_stop >= 0.0, "LimitConfig.d_stop", d_stop, "finite and at least 0");
-  require(finite(near_distance) && near_distance >= d_stop, "LimitConfig.near_distance",
-          near_distance, "finite and at least d_stop");
-  positive("LimitConfig.near_speed", near_speed);
-  positive("LimitConfig.retreat_speed", retreat_speed);
-  delay("LimitConfig.joint_state_age", joint_state_age);
-  delay("LimitConfig.dead_time", dead_time);
-  delay("LimitConfig.lag", lag);
-  delay("LimitConfig.scan_latency", scan_latency);
-  require(period_margin >= 1.0 && period_margin <= 10.0, "LimitConfig.period_margin", period_margin,
-          "between 1 and 10");
-  require(level_ratio > 0.0 && level_ratio <= 1.0, "LimitConfig.level_ratio", level_ratio,
-          "above 0 and at most 1");
-  require(least_weight >= 1e-6 && least_weight <= 1.0, "LimitConfig.least_weight", least_weight,
-          "between 1e-6 and 1");
+void check(const LimitConfig& config, const std::string& path) {
+  require(config.near_distance >= config.d_stop, path + "near_distance",
+          detail::with_unit(config.near_distance, "m"),
+          "at least d_stop = " + detail::with_unit(config.d_stop, "m"));
 }
 
 void LimitConfig::require_stable(double gain, double period) const {
@@ -103,20 +84,32 @@ void brake_together(const Limits& limits, const JointVector& qd_last, double ela
   out = (rest * qd_last).cwiseMax(interval.low).cwiseMin(interval.high);
 }
 
-double approach_speed(const LimitConfig& config, double distance, double reaction,
+double approach_speed(const LimitConfig& config, const ApproachCap& cap, double reaction,
                       double braking_time) {
-  const double stop = distance - config.d_stop;
-  if (!(stop > 0.0)) return 0.0;
+  const double room = cap.distance - cap.stop;
+  if (!(room > 0.0)) return 0.0;
   const double T = reaction + 0.5 * braking_time;
-  const double c = stop / T;
+  const double c = std::min(room / T, cap.speed);
+  if (!(cap.near > 0.0)) return c;
   // With a lag the arm's speed nears the command's exponentially: two time constants more.
-  const double beyond = distance - config.near_distance - 2.0 * config.lag * config.near_speed;
+  const double beyond = cap.distance - cap.near - 2.0 * config.lag * config.near_speed;
   if (!(beyond > 0.0)) return std::min(c, config.near_speed);
+  if (std::isinf(beyond)) return c;
   // c reaction + (c^2 - near_speed^2) / (2 a) = beyond, a = c / braking_time.
   const double v = config.near_speed;
   const double to_near =
       (beyond + std::sqrt(beyond * beyond + 2.0 * T * braking_time * v * v)) / (2.0 * T);
   return std::min(c, std::max(v, to_near));
+}
+
+double approach_distance(const LimitConfig& config, const ApproachCap& cap, double speed,
+                         double reaction, double braking_time) {
+  const double T = reaction + 0.5 * braking_time;
+  const double stopped = cap.stop + speed * T;
+  const double v = config.near_speed;
+  if (!(cap.near > 0.0) || !(speed > v)) return stopped;
+  const double beyond = speed * reaction + 0.5 * braking_time * (speed - v * v / speed);
+  return std::max(stopped, cap.near + 2.0 * config.lag * v + beyond);
 }
 
 double retreat_rate(const LimitConfig& config, const RetreatRow& row) {

@@ -19,7 +19,7 @@ inline Limits arm_limits(Eigen::Index n) {
           JointVector::Constant(n, 2.0), JointVector::Constant(n, 10.0)};
 }
 
-/// Owns what a LimitInput refers to.
+/// Owns what a LimitInput refers to, and the state before it.
 struct LimitCase {
   Limits limits;
   JointVector q, nominal, qd_last;
@@ -28,7 +28,10 @@ struct LimitCase {
   std::vector<ApproachCap> caps;
   std::vector<RetreatRow> retreats;
 
-  LimitInput input() const { return {q, nominal, qd_last, elapsed, tasks, caps, retreats}; }
+  const LimitOutput& through(Limiter& limiter) const {
+    limiter.begin(q, qd_last, elapsed);
+    return limiter.limit({nominal, tasks, caps, retreats});
+  }
 };
 
 enum class Shape { kOrdinary, kBadlyScaled, kPinched, kContradictory };

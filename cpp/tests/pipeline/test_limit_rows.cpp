@@ -89,7 +89,8 @@ TEST(ApproachSpeed, IsTheSpeedThatStopsAtDStop) {
   for (int trial = 0; trial < 2000; ++trial) {
     const double T = random.uniform(0.02, 0.3), tau = random.uniform(0.0, 0.5);
     const double d = random.uniform(-0.05, 0.6);
-    const double c = approach_speed(config, d, T, tau);
+    ApproachCap cap{.distance = d};
+    const double c = approach_speed(config, cap, T, tau);
     if (d <= config.d_stop) {
       EXPECT_EQ(c, 0.0);
       continue;
@@ -106,8 +107,13 @@ TEST(ApproachSpeed, IsTheSpeedThatStopsAtDStop) {
         EXPECT_LE(c * T + (c * c - v * v) / (2.0 * a), d - config.near_distance + 1e-9);
       }
     }
-    EXPECT_GE(approach_speed(config, d + 0.01, T, tau), c);
-    EXPECT_LE(approach_speed(config, d + 1e-7, T, tau) - c, 1e-4);
+    if (c > 0.0) {
+      EXPECT_LE(approach_distance(config, cap, c, T, tau), d + 1e-9);
+    }
+    cap.distance = d + 0.01;
+    EXPECT_GE(approach_speed(config, cap, T, tau), c);
+    cap.distance = d + 1e-7;
+    EXPECT_LE(approach_speed(config, cap, T, tau) - c, 1e-4);
   }
 }
 
@@ -144,7 +150,8 @@ TEST(ApproachCap, AnArmDrivenAtAWallStopsBeforeDStopAndIsSlowNearIt) {
     caps[0].row = JointVector::Constant(1, -reach);
     for (int tick = 0; tick < 1000; ++tick) {
       caps[0].distance = 1.0 - reach * q[0];
-      qd = limiter.limit({q, nominal, qd, kDt, {}, caps, {}}).qd;
+      limiter.begin(q, qd, kDt);
+      qd = limiter.limit({.nominal = nominal, .caps = caps}).qd;
       delayed.push_back(qd[0]);
       const double command = delayed.front();
       delayed.pop_front();
@@ -225,7 +232,8 @@ double tool_rms(double v_low, double v_high, double dead_time, bool& pinched, do
     reach.jacobian = J;
     reach.rate = reach.activation = RowVector::Ones(6);
     const JointVector nominal = 1.0 * (goal - q);
-    const LimitOutput& out = limiter.limit({q, nominal, qd, kDt, {&reach, 1}, caps, retreats});
+    limiter.begin(q, qd, kDt);
+    const LimitOutput& out = limiter.limit({nominal, {&reach, 1}, caps, retreats});
     qd = out.qd;
     pinched = out.pinched;
     delayed.push_back(qd);

@@ -3,36 +3,10 @@
 #include <memory>
 #include <span>
 
-#include "proxcgal/pipeline/command.hpp"
+#include "proxcgal/pipeline/limit_config.hpp"
 #include "proxcgal/types.hpp"
 
 namespace proxcgal {
-
-/// Settings of the limit stage.
-struct LimitConfig {
-  bool distances = true;         ///< levels (1) and (2); without them joint limits only
-  double d_stop = 0.05;          ///< [m] no approach nearer than this
-  double near_distance = 0.10;   ///< [m] nearer than this the arm approaches at near_speed at most
-  double near_speed = 0.05;      ///< [m/s]
-  double retreat_speed = 0.25;   ///< [m/s] fastest retreat nearer than d_stop
-  double joint_state_age = 0.0;  ///< [s] age of the joint state at the tick
-  double dead_time = 0.0;        ///< [s] from a command to its first effect
-  double lag = 0.0;              ///< [s] time constant of the arm's velocity loop
-  double scan_latency = 0.0;     ///< [s] nominal, from measurement to tick: in the caps only
-  double period_margin = 1.5;    ///< max_period over the longest recent interval
-  double level_ratio = 0.1;      ///< weight of a level of (3) over the one above it
-  double least_weight = 1e-3;    ///< eps of (3), and the least weight of a level
-
-  /// The papers' law within the joints' limits.
-  static LimitConfig papers() { return {.distances = false}; }
-  /// @throws ConfigError  with the field, its value and what is allowed
-  void validate() const;
-  /// Delay of the loop that retreat closes [s].
-  double loop_delay(double period) const { return joint_state_age + period + dead_time + lag; }
-  /// gain x loop delay at most 1/e: a first-order loop with that delay does not ring.
-  /// @throws ConfigError  with the numbers
-  void require_stable(double gain, double period) const;
-};
 
 /// Longest time a command may be held [s]: at least three nominal periods, and the longest recent
 /// interval times a margin. Forgets a long interval in about 100 ticks.
@@ -81,6 +55,8 @@ enum class LimitKind : std::uint8_t {
 struct ApproachCap {
   JointVector row;              ///< (n,) n'J, derivative of the distance by the joints
   double distance = kInfinity;  ///< [m] signed, less what sigma, mesh error and age take off
+  double stop = 0.05;           ///< [m] no approach nearer than this
+  double near = 0.10;           ///< [m] nearer than this at near_speed at most; 0 for own links
   double speed = kInfinity;     ///< [m/s] another bound on c, as for unknown volume
   LimitKind kind = LimitKind::kApproach;
   int link = -1;
@@ -102,12 +78,16 @@ struct RetreatRow {
 ///
 /// From the closing speed c the joints, braking together, close another c reaction + c^2 / (2 a),
 /// a = c / braking_time. That is c = a (sqrt(T^2 + 2 (d - d_stop) / a) - T), solved for this a:
-/// c = (d - d_stop) / (T + braking_time / 2). Nearer than near_distance at most near_speed; farther
-/// at most the speed from which near_speed is reached at near_distance.
+/// c = (d - stop) / (T + braking_time / 2). Nearer than `near` at most near_speed; farther at most
+/// the speed from which near_speed is reached at `near`.
+/// @param cap           its distance, stop, near and speed
 /// @param reaction      T [s]
 /// @param braking_time  [s] until all joints rest
-double approach_speed(const LimitConfig& config, double distance, double reaction,
+double approach_speed(const LimitConfig& config, const ApproachCap& cap, double reaction,
                       double braking_time);
+/// (1) The distance from which `speed` is allowed on: the inverse of `approach_speed` [m].
+double approach_distance(const LimitConfig& config, const ApproachCap& cap, double speed,
+                         double reaction, double braking_time);
 /// (2) max(0, n'v_o) + gain (d_min - d), at most retreat_speed nearer than d_stop; the bound rises
 /// steeply, not in a step, beyond d_stop.
 double retreat_rate(const LimitConfig& config, const RetreatRow& row);
@@ -117,14 +97,21 @@ double retreat_weight(const RetreatRow& row);
 inline constexpr int kMaxCaps = 32;
 inline constexpr int kMaxRetreats = 16;
 
+/// What a tick asks for, once `Limiter::begin` knows its state.
 struct LimitInput {
-  const JointVector& q;        ///< (n,) finite
   const JointVector& nominal;  ///< (n,) what the solver asks for
-  const JointVector& qd_last;  ///< (n,) last command, finite
-  double elapsed = 0.0;        ///< [s] since that command
   std::span<const Task> tasks = {};
   std::span<const ApproachCap> caps = {};     ///< the first kMaxCaps are weighed, all are kept
   std::span<const RetreatRow> retreats = {};  ///< nearest first; at most kMaxRetreats are read
+};
+
+/// State of a tick, and what of it limits every velocity.
+struct LimitState {
+  bool usable = false;     ///< joint state, last command and interval are finite
+  JointInterval interval;  ///< (0)
+  JointVector qd_brake;    ///< all joints brake together, inside the interval
+  double reaction = 0.0;   ///< T of (1) [s]
+  double braking_time = 0.0;  ///< [s] until all joints rest
 };
 
 /// A row that changed the command.
@@ -145,8 +132,6 @@ enum class LimitStatus : std::uint8_t {
 struct LimitOutput {
   JointVector qd;
   LimitStatus status = LimitStatus::kBraking;
-  JointInterval interval;  ///< (0)
-  JointVector qd_brake;
   std::array<ActiveLimit, 2 * kMaxJoints + kMaxCaps + kMaxRetreats> active;
   int n_active = 0;
   std::array<double, kMaxRetreats> share{};  ///< of each retreat row's rate that qd has, [0, 1]
@@ -183,9 +168,17 @@ class Limiter {
   Limiter(Limiter&&) noexcept;
   Limiter& operator=(Limiter&&) noexcept;
 
+  /// Begins a tick. @param q  (n,) measured
+  /// @param qd_last  (n,) last command
+  /// @param elapsed  [s] since that command
+  /// @param joint_state_age  [s] of q; counts where it is more than the configured one
+  const LimitState& begin(const JointVector& q, const JointVector& qd_last, double elapsed,
+                          double joint_state_age = 0.0);
+  /// The command of the tick that `begin` began; zero where its state is not usable.
   const LimitOutput& limit(const LimitInput& input);
-  /// Brakes within (0): for faults that forbid everything else.
-  const LimitOutput& brake(const JointVector& q, const JointVector& qd_last, double elapsed);
+  /// The same where a fault forbids everything but braking.
+  const LimitOutput& brake();
+  const LimitState& state() const;
   const LimitConfig& config() const;
   double max_period() const;
 
