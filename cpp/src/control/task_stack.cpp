@@ -14,7 +14,10 @@ constexpr double kJustBeyond = 1e-6;  // [m]
 
 TaskStack::TaskStack(const Robot& robot, const Skin& skin, const ControllerConfig& config)
     : robot_(robot), skin_(skin), config_(config), self_collision_pairs_(robot, config) {
-  for (const TaskSpec& task : config.tasks) validate(task, robot);
+  for (const TaskSpec& task : config.tasks) {
+    validate(task, robot);
+    has_own_ = has_own_ || std::holds_alternative<SelfCollision>(task);
+  }
 }
 
 void TaskStack::build_rows(const Avoidance& spec, std::size_t level, const Posture& posture,
@@ -77,6 +80,9 @@ void TaskStack::build(const Posture& posture, const PointsRef& cloud_W,
       monitor.add({.reason = Reason::kRowSmall});
     tasks_[level] = task.task;
   }
+  // Own links are kept off one another in any stack.
+  if (config_.limit.distances && !has_own_)
+    own_pairs_ = self_collision_pairs_.nearest(own_spec_, robot_, posture, monitor);
 }
 
 void TaskStack::report(TickOutput& out) const {

@@ -60,6 +60,7 @@ class TaskStack {
   std::array<std::array<int, kMaxRows>, kMaxLevels> links_{};
   std::span<const LinkPair> own_pairs_;
   SelfCollision own_spec_;
+  bool has_own_ = false;  // the stack has a task for them
 };
 
 /// Settings with other values for the same tasks in the same order.
