@@ -25,5 +25,5 @@ list(TRANSFORM proxcgal_cmeel_prefixes APPEND /cmeel.prefix/include)
 find_path(EIQUADPROG_INCLUDE_DIR eiquadprog/eiquadprog-rt.hpp HINTS ${proxcgal_cmeel_prefixes}
           REQUIRED)
 # For the one file that needs it: that prefix may hold a Boost too, which CGAL must not take.
-set_source_files_properties(cpp/src/pipeline/least_distance.cpp
+set_source_files_properties(cpp/src/pipeline/limit_least_distance.cpp
                             PROPERTIES COMPILE_OPTIONS "-isystem;${EIQUADPROG_INCLUDE_DIR}")

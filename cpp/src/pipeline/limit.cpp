@@ -20,7 +20,9 @@ constexpr double kContradictory = 0.5;    // contradiction above which the nomin
 constexpr double kBlocked = 0.8;          // ... and above which it is taken off
 constexpr double kStandViolation = 0.02;  // [m/s] violation at which it is taken off
 constexpr std::array kRelax{1e-11, 1e-9, 1e-7};  // [m/s]
+constexpr double kLeavesWithin = 0.03;           // [m] beyond d_stop
 constexpr double kPinched = 0.5;                 // of `stand`
+constexpr double kStandFor = 1.0;                // [s] in which `stand` falls from 1 to 0
 
 bool usable(const JointVector& v, Eigen::Index n) {
   return v.size() == n && v.allFinite() && (v.size() == 0 || v.cwiseAbs().maxCoeff() <= kFar);
@@ -48,6 +50,7 @@ struct Limiter::Impl {
   LimitState state;
   Programme programme;
   LimitOutput out;
+  double stand = 0.0;  // taken off the nominal for having been pinched a moment ago
   JointVector candidate, target, clamped;
   JointVector executed;  // velocity of an arm that follows with a lag of dead time + lag
   JointVector overrun;   // how far it still moves beyond what the last command says
@@ -81,6 +84,7 @@ struct Limiter::Impl {
     const double share = follows > 0.0 ? -std::expm1(-window / follows) : 1.0;
     executed += share * (qd_last - executed);
     overrun = follows * (executed - qd_last);
+    stand = std::max(0.0, stand - window / kStandFor);
   }
 
   double cap_least(const ApproachCap& cap) const {
@@ -114,8 +118,10 @@ struct Limiter::Impl {
       row = {.row = &retreat.row, .least = rate};
       row.binds = least(retreat.row, state.interval) < rate;
       programme.weight[k] = retreat_weight(retreat);
+      // Beyond d_stop a row leaves (2a) by and by: no row enters or leaves in a step.
       programme.allowance[k] =
-          std::max(0.0, retreat.gain) * std::max(0.0, retreat.distance - config.d_stop);
+          std::max(0.0, rate) *
+          ramp(retreat.distance, config.d_stop, config.d_stop + kLeavesWithin);
     }
     return true;
   }
@@ -167,7 +173,8 @@ struct Limiter::Impl {
     std::array<double, kMaxRetreats> rates;
     const auto n_rows = static_cast<std::size_t>(programme.n_retreats);
     for (std::size_t k = 0; k < n_rows; ++k) rates[k] = programme.retreats[k].least;
-    target = in.nominal;
+    target = (1.0 - stand) * in.nominal;
+    out.stand = stand;
     // (3) with every retreat row fulfilled: then (2a) and (2b) have nothing left to do.
     if (attainable() && levels.nearest(programme, target, rates, candidate)) {
       keep_caps(in, candidate);
@@ -178,7 +185,8 @@ struct Limiter::Impl {
     out.status = LimitStatus::kBraking;
     if (n_rows == 0) return;
     // (2a)
-    clamped = in.nominal.cwiseMax(state.interval.low).cwiseMin(state.interval.high);
+    clamped = ((1.0 - stand) * in.nominal).cwiseMax(state.interval.low).cwiseMin(state.interval.high);
+    levels.calm(stand);
     if (!levels.least_violation(programme, clamped, candidate)) return;
     out.qd = candidate;
     keep_caps(in, out.qd);
@@ -200,8 +208,10 @@ struct Limiter::Impl {
       worst = std::max(worst, programme.retreats[k].least - rate);
       rates[k] = std::min(rates[k], rate);
     }
-    out.stand =
-        ramp(out.contradiction, kContradictory, kBlocked) * ramp(worst, 0.0, kStandViolation);
+    // It falls slowly: an arm that stands is not pinched for long by its own nominal motion.
+    out.stand = std::max(stand, ramp(out.contradiction, kContradictory, kBlocked) *
+                                    ramp(worst, 0.0, kStandViolation));
+    stand = out.stand;
     out.pinched = out.stand > kPinched;
     // (3)
     target = (1.0 - out.stand) * in.nominal;
@@ -299,7 +309,7 @@ const LimitState& Limiter::begin(const JointVector& q, const JointVector& qd_las
 const LimitOutput& Limiter::limit(const LimitInput& in) {
   Impl& me = *impl_;
   if (!me.state.usable || !me.read(in)) return me.out;
-  if (me.admissible(in)) {
+  if (me.stand == 0.0 && me.admissible(in)) {
     me.out.qd = in.nominal;
     me.out.status = LimitStatus::kUnchanged;
   } else {

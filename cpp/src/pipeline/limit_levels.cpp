@@ -11,6 +11,9 @@ namespace {
 /// picks the one next to the nominal, and a row of that norm fades out instead of asking for any
 /// joint speed. A row of norm 0.05 misses its optimum by 4e-6 of its rate.
 constexpr double kMotion = 1e-4;
+/// The same where the arm stands because it is pinched: what is left to gain by motion along which
+/// the rows hardly change is not worth it.
+constexpr double kCalmMotion = 0.3;
 /// [m/s] by which what a level above found is relaxed: its rounding.
 constexpr double kRelax = 1e-11;
 
@@ -23,6 +26,8 @@ Levels::Levels(int n)
       L_(JointMatrix::Identity(n, n)),
       L_inverse_(L_),
       scratch_(JointVector::Zero(n)) {}
+
+void Levels::calm(double stand) { motion_ = std::max(kMotion, kCalmMotion * stand); }
 
 /// Rows (0) and (1) in z = scale (qd - centre).
 void Levels::begin(LeastDistance& solver, int variables, Programme& programme,
@@ -57,7 +62,7 @@ bool Levels::finish(LeastDistance& solver, const Programme& programme, const Joi
 
 bool Levels::least_violation(Programme& programme, const JointVector& near, JointVector& qd) {
   // (2a)  min t^2 + (motion |qd - near|)^2  s.t.  row qd + t >= rate - allowance, (0), (1)
-  const double scale = kMotion;
+  const double scale = motion_;
   begin(*slacks_, n_ + 1, programme, near, scale);
   for (int i = 0; i < programme.n_retreats; ++i) {
     const auto k = static_cast<std::size_t>(i);
@@ -74,7 +79,7 @@ bool Levels::least_squares(Programme& programme, const JointVector& near, double
                            JointVector& qd) {
   // (2b)  min sum w s^2 + (motion |qd - near|)^2  s.t.  row qd + s >= rate,
   //       row qd >= rate - allowance - t, (0), (1)
-  const double scale = kMotion;
+  const double scale = motion_;
   begin(*slacks_, n_ + programme.n_retreats, programme, near, scale);
   for (int i = 0; i < programme.n_retreats; ++i) {
     const auto k = static_cast<std::size_t>(i);

@@ -1,4 +1,4 @@
-#include "least_distance.hpp"
+#include "limit_least_distance.hpp"
 
 #include <algorithm>
 #include <cmath>
