@@ -20,7 +20,7 @@ constexpr double kContradictory = 0.5;    // contradiction above which the nomin
 constexpr double kBlocked = 0.8;          // ... and above which it is taken off
 constexpr double kStandViolation = 0.02;  // [m/s] violation at which it is taken off
 constexpr std::array kRelax{1e-11, 1e-9, 1e-7};  // [m/s]
-constexpr double kLeavesWithin = 0.03;           // [m] beyond d_stop
+constexpr double kLeavesWithin = 0.04;           // [m] beyond d_stop
 constexpr double kPinched = 0.5;                 // of `stand`
 constexpr double kStandFor = 1.0;                // [s] in which `stand` falls from 1 to 0
 
@@ -50,7 +50,8 @@ struct Limiter::Impl {
   LimitState state;
   Programme programme;
   LimitOutput out;
-  double stand = 0.0;  // taken off the nominal for having been pinched a moment ago
+  double nearest = kInfinity;  // [m] of the retreat rows
+  double stand = 0.0;          // taken off the nominal for having been pinched a moment ago
   JointVector candidate, target, clamped;
   JointVector executed;  // velocity of an arm that follows with a lag of dead time + lag
   JointVector overrun;   // how far it still moves beyond what the last command says
@@ -109,7 +110,9 @@ struct Limiter::Impl {
       row.binds = least(cap.row, state.interval) < row.least;
       if (row.binds) ++programme.n_caps;
     }
+    nearest = kInfinity;
     for (const RetreatRow& retreat : in.retreats) {
+      nearest = std::min(nearest, retreat.distance);
       if (programme.n_retreats == kMaxRetreats) break;
       const double rate = retreat_rate(config, retreat);
       if (!usable(retreat.row, n) || std::isnan(rate) || rate > kFar) return false;
@@ -186,7 +189,8 @@ struct Limiter::Impl {
     if (n_rows == 0) return;
     // (2a)
     clamped = ((1.0 - stand) * in.nominal).cwiseMax(state.interval.low).cwiseMin(state.interval.high);
-    levels.calm(stand);
+    // Nearer than d_stop every bit of distance counts.
+    levels.calm(stand * ramp(nearest, config.d_stop, config.d_stop + kLeavesWithin));
     if (!levels.least_violation(programme, clamped, candidate)) return;
     out.qd = candidate;
     keep_caps(in, out.qd);

@@ -62,7 +62,7 @@ bool Levels::finish(LeastDistance& solver, const Programme& programme, const Joi
 
 bool Levels::least_violation(Programme& programme, const JointVector& near, JointVector& qd) {
   // (2a)  min t^2 + (motion |qd - near|)^2  s.t.  row qd + t >= rate - allowance, (0), (1)
-  const double scale = motion_;
+  const double scale = kMotion;
   begin(*slacks_, n_ + 1, programme, near, scale);
   for (int i = 0; i < programme.n_retreats; ++i) {
     const auto k = static_cast<std::size_t>(i);

@@ -166,9 +166,9 @@ TEST(Limit, IsContinuousWhereARowCrossesDStop) {
   for (int trial = 0; trial < test::repeats(60, 1000); ++trial) {
     LimitCase one = random_case(random, 6, Shape::kPinched, 2, 6);
     one.elapsed = 0.05;
-    Limiter limiter(one.limits, {}, kDt);
     JointVector before;
     for (int i = -20; i <= 20; ++i) {
+      Limiter limiter(one.limits, {}, kDt);  // one that was not pinched before
       one.retreats[0].distance = 0.05 + 1e-5 * i;
       const JointVector qd = one.through(limiter).qd;
       if (i > -20) steepest = std::max(steepest, (qd - before).norm() / 1e-5);
@@ -195,7 +195,8 @@ TEST(Limit, ContradictoryRowsArePinchedAndFadeTheNominal) {
   EXPECT_TRUE(out.pinched);
   EXPECT_NEAR(out.qd.norm(), 0.0, 1e-9);
   one.retreats.pop_back();  // one row that joints limit is no contradiction
-  EXPECT_FALSE(one.through(limiter).pinched);
+  Limiter fresh(one.limits, {}, kDt);
+  EXPECT_FALSE(one.through(fresh).pinched);
 }
 
 TEST(LimitConfig, RefusesALoopThatRings) {
