@@ -180,7 +180,7 @@ struct Controller::Impl {
       rows.add_silent_views(clock.now(), posture, *scene.perception);
     if (!config.limit.distances) return;
     rows.add_links(scene, control_points);
-    if (out.pair) rows.add_nearest(posture, trusted.control(out, Vector3::Zero()));
+    if (out.pair) rows.keep_nearest(out.trusted_distance, limiter.state());
     if (config.control_point == ControlPoint::kSensor && out.control.link >= 0)
       rows.add_sensor_point(posture, out.control);
     rows.add_own(posture, stack.own_spec(), stack.own_pairs());

@@ -7,6 +7,7 @@ namespace proxcgal::detail {
 namespace {
 
 constexpr double kBlindMotion = 0.02;  // [m/s] slower motion into a silent view is not reported
+constexpr double kStiffest = 10.0;      // [1/s]
 constexpr double kFarthestReach = 1.5;  // [m] of a search round a link
 
 std::array<Vector3, 5> view_directions(const SensorModel& model) {
@@ -128,16 +129,20 @@ void DistanceRows::add_links(const DistanceScene& scene, ControlPoints& control_
   }
 }
 
-void DistanceRows::add_nearest(const Posture& posture, const ControlPair& nearest) {
+void DistanceRows::keep_nearest(double nearest, const LimitState& state) {
   const Avoidance* spec = avoidance();
   if (!whole_body_ || spec == nullptr) return;
-  // Inside d_min the nearest pair comes no nearer, whatever the other rows ask for.
-  caps_.push_back({.row = opening_row(robot_, posture, nearest),
-                   .distance = nearest.distance,
-                   .stop = spec->d_min,
-                   .near = 0.0,
-                   .kind = LimitKind::kApproach,
-                   .link = nearest.link});
+  // Inside d_min the nearest pair comes no nearer, whatever the other rows ask for, and those that
+  // are hardly farther off hardly nearer: between two equals nothing jumps.
+  const double beyond = std::max(0.0, nearest - spec->d_min) /
+                        (state.reaction + 0.5 * state.braking_time);
+  const double stiffness = std::min(
+      kStiffest, std::exp(-1.0) / config_.limit.loop_delay(config_.period));
+  for (ApproachCap& cap : caps_) {
+    if (cap.kind != LimitKind::kApproach) continue;
+    const double farther = std::max(0.0, cap.distance - nearest);
+    cap.speed = std::min(cap.speed, stiffness * farther + beyond);
+  }
 }
 
 void DistanceRows::add_sensor_point(const Posture& posture, const ControlPair& control) {

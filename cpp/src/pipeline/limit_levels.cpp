@@ -13,7 +13,9 @@ namespace {
 constexpr double kMotion = 1e-4;
 /// The same where the arm stands because it is pinched: what is left to gain by motion along which
 /// the rows hardly change is not worth it.
-constexpr double kCalmMotion = 0.3;
+constexpr double kCalmMotion = 1.0;
+/// [m/s] The same of what (2a) found: rows that all hold with equality leave no calm motion.
+constexpr double kCalmLeeway = 0.01;
 /// [m/s] by which what a level above found is relaxed: its rounding.
 constexpr double kRelax = 1e-11;
 
@@ -27,7 +29,10 @@ Levels::Levels(int n)
       L_inverse_(L_),
       scratch_(JointVector::Zero(n)) {}
 
-void Levels::calm(double stand) { motion_ = std::max(kMotion, kCalmMotion * stand); }
+void Levels::calm(double stand) {
+  motion_ = std::max(kMotion, kCalmMotion * stand);
+  leeway_ = kCalmLeeway * stand;
+}
 
 /// Rows (0) and (1) in z = scale (qd - centre).
 void Levels::begin(LeastDistance& solver, int variables, Programme& programme,
@@ -62,7 +67,7 @@ bool Levels::finish(LeastDistance& solver, const Programme& programme, const Joi
 
 bool Levels::least_violation(Programme& programme, const JointVector& near, JointVector& qd) {
   // (2a)  min t^2 + (motion |qd - near|)^2  s.t.  row qd + t >= rate - allowance, (0), (1)
-  const double scale = kMotion;
+  const double scale = motion_;
   begin(*slacks_, n_ + 1, programme, near, scale);
   for (int i = 0; i < programme.n_retreats; ++i) {
     const auto k = static_cast<std::size_t>(i);
@@ -89,7 +94,7 @@ bool Levels::least_squares(Programme& programme, const JointVector& near, double
     scratch_ = *retreat.row / scale;
     const double rate = retreat.least - retreat.row->dot(near);
     retreat.at = slacks_->add(scratch_, n_ + i, 1.0 / std::sqrt(programme.weight[k]), rate);
-    at_most_[k] = slacks_->add(scratch_, rate - programme.allowance[k] - most - kRelax);
+    at_most_[k] = slacks_->add(scratch_, rate - programme.allowance[k] - most - leeway_ - kRelax);
   }
   return finish(*slacks_, programme, near, scale, qd);
 }

@@ -31,7 +31,7 @@ class Levels {
  public:
   explicit Levels(int n);
 
-  /// How much (2b) weighs motion. @param stand  in [0, 1]: pinched
+  /// How much (2a) and (2b) weigh motion. @param stand  in [0, 1]: pinched
   void calm(double stand);
   /// Least over the interval of the largest violation less its row's allowance.
   bool least_violation(Programme& programme, const JointVector& near, JointVector& qd);
@@ -65,7 +65,8 @@ class Levels {
   std::array<int, kMaxJoints> at_low_{}, at_high_{};
   std::array<int, kMaxRetreats> at_most_{};
   JointVector scratch_;
-  double motion_ = 0.0;  // [m/s per rad/s] square root of the weight of motion in (2b)
+  double leeway_ = 0.0;  // [m/s] of (2b) over what (2a) found
+  double motion_ = 0.0;  // [m/s per rad/s] square root of the weight of motion in (2a) and (2b)
 };
 
 }  // namespace proxcgal::detail
