@@ -29,7 +29,7 @@ struct LimitConfig {
   double scan_latency = 0.0;
   double period_margin = 1.5;
   double level_ratio = 0.1;
-  double least_weight = 1e-3;
+  double least_weight = 1e-2;
 
   /// The papers' law within the joints' limits: no approach cap on what is seen, no retreat.
   static LimitConfig papers() { return {.distances = false}; }
