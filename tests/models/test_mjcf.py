@@ -85,7 +85,7 @@ def test_links_look_as_their_visual_geoms_else_as_all_they_have(own: Path) -> No
 
 BODY = '<body name="b"><joint name="j"/><geom size="0.1"/>{}</body>'
 INNER = '<body name="c"><joint name="k"/><geom size="0.1"/></body>'
-TENDON = '<tendon>{}</tendon>'
+TENDON = "<tendon>{}</tendon>"
 FIXED = '<fixed name="t"{}><joint joint="j" coef="1"/>{}</fixed>'
 REFUSED = {
     "second body at the top": (BODY.format("") + '<body name="c"><geom size="0.1"/></body>', "",

@@ -155,7 +155,9 @@ class RandomRobot:
         text = f'<link name="l{row}">{looks}</link>'
         if row:
             low, high = body.limits
-            limit = f'<limit lower="{low!r}" upper="{high!r}" velocity="{body.speed!r}" effort="1"/>'
+            limit = (
+                f'<limit lower="{low!r}" upper="{high!r}" velocity="{body.speed!r}" effort="1"/>'
+            )
             text += (
                 f'<joint name="j{row}" type="{body.kind}"><parent link="l{body.parent}"/>'
                 f'<child link="l{row}"/>{_origin(body.T)}<axis xyz="{_n(body.axis)}"/>'
@@ -189,7 +191,7 @@ class RandomRobot:
         path = folder / "robot.xacro"
         path.write_text(
             f'<robot name="r" {space}><xacro:arg name="speed_factor" default="7"/>'
-            "<xacro:property name=\"limits\" value=\"${xacro.load_yaml('parts/limits.yaml')}\"/>"
+            '<xacro:property name="limits" value="${xacro.load_yaml(\'parts/limits.yaml\')}"/>'
             + "".join(self._xacro_body(row) for row in range(half))
             + '<xacro:include filename="parts/rest.xacro"/></robot>'
         )
@@ -226,9 +228,7 @@ class RandomRobot:
             body, C = self.bodies[row], self.own[row]
             back = np.linalg.inv(C)
             # MuJoCo wants a mass of what moves.
-            inside = "" if body.parts else (
-                '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
-            )
+            inside = "" if body.parts else ('<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>')
             placed = np.linalg.inv(self.own[body.parent]) @ body.T if row else np.eye(4)
             if body.kind != "fixed":
                 slides = body.kind == "prismatic"

@@ -26,7 +26,7 @@ usage: proxcgal COMMAND ...
   replay FILE    step through a recording
   report DIR     write DIR/report.html from the results in DIR
   scenarios      the scenes there are
-  robots         the robots there are
+  robots         the robots there are; robots check FILE: what is understood of one
 
   --help         this text; `proxcgal COMMAND --help` tells a command's options
   --version      versions of proxcgal and of what its results depend on
@@ -53,7 +53,7 @@ COMMANDS = {
     "replay": "proxcgal.cli.replay",
     "report": "proxcgal.cli.report",
     "scenarios": "proxcgal.cli.lists",
-    "robots": "proxcgal.cli.lists",
+    "robots": "proxcgal.cli.robots",
 }
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 

@@ -20,9 +20,9 @@ from proxcgal.core.errors import ConfigError, ModelError, ModelWarning
 from proxcgal.core.typing import Array, Ints
 from proxcgal.models.builtin import BUILTIN
 from proxcgal.models.description import RobotDescription, listed
+from proxcgal.models.doubts import doubts
 from proxcgal.models.formats.description_reader import read_description
 from proxcgal.models.formats.paths import ROBOT_SUFFIXES, is_robot_file
-from proxcgal.models.doubts import doubts
 from proxcgal.models.limits import PerJoint, with_limits
 from proxcgal.models.mesh.resolution import (
     COUNT_TOLERANCE,
@@ -171,16 +171,7 @@ def load_robot(
     """
     check_resolution("vertices_per_link", vertices_per_link, max_deviation)
     builtin = BUILTIN.get(str(name_or_path))
-    if builtin is not None:
-        if package_dirs or base or xacro_args:
-            raise ConfigError(
-                f"robot '{name_or_path}' is built in; package_dirs, base and xacro_args are for files"
-            )
-        description = builtin.describe()
-    else:
-        description = read_description(
-            _file(name_or_path), package_dirs, base, xacro_args=xacro_args
-        )
+    description = describe_robot(name_or_path, package_dirs, base=base, xacro_args=xacro_args)
     description = with_limits(
         description, builtin.limits if builtin else None, speed_limits, acceleration_limits
     )
@@ -191,6 +182,28 @@ def load_robot(
             warnings.warn(f"{description.source}: {note}", ModelWarning, stacklevel=2)
     description.tool_frame  # noqa: B018  raises where it is not known, before the meshes take time
     return Robot(description, control_meshes(description, vertices_per_link, max_deviation))
+
+
+def describe_robot(
+    name_or_path: str | os.PathLike[str],
+    package_dirs: Sequence[str | os.PathLike[str]] = (),
+    *,
+    base: str | None = None,
+    xacro_args: Mapping[str, str | float | bool] | None = None,
+) -> RobotDescription:
+    """What `load_robot` knows of a robot before limits are put in place and meshes made coarser.
+
+    Raises: as `load_robot`.
+    """
+    builtin = BUILTIN.get(str(name_or_path))
+    if builtin is not None:
+        if package_dirs or base or xacro_args:
+            raise ConfigError(
+                f"robot '{name_or_path}' is built in; package_dirs, base and xacro_args are for files"
+            )
+        return builtin.describe()
+    path = _file(name_or_path)
+    return read_description(path, package_dirs, base, xacro_args=xacro_args)
 
 
 def control_meshes(

@@ -79,9 +79,7 @@ def _read(path: Path, folders: MeshFolders, base: str | None, arguments: dict[st
         made = expand(path, folders, arguments)
         root, files, context = made.root, made.files, made.context
         if root.tag not in ("robot", "mujoco"):
-            raise ModelError(
-                f"{path}: it makes a <{root.tag}>; expected <mujoco> or <robot>"
-            )
+            raise ModelError(f"{path}: it makes a <{root.tag}>; expected <mujoco> or <robot>")
         if root.tag == "mujoco":
             raise ModelError(f"{path}: it makes an MJCF; of a xacro, URDF is read")
     else:

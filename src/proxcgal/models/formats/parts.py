@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from proxcgal.core.typing import Array, Ints
 from proxcgal.models.description import Frame, Joint, Link, RobotDescription, listed
 from proxcgal.models.mesh.files import clean_mesh, load_mesh
 
+Kind = Literal["revolute", "prismatic"]
 # The frame that the base stands in, where it has no link of its own.
 WORLD = "world"
 # A tool frame by these names is taken where the user names none, the first of them that is there.
@@ -105,9 +107,7 @@ def assembled(
             "base"
         )
     T_WU = np.linalg.inv(known[base].T_JF)
-    based = tuple(
-        replace(f, T_JF=T_WU @ f.T_JF) if f.joint < 0 else f for f in known.values()
-    )
+    based = tuple(replace(f, T_JF=T_WU @ f.T_JF) if f.joint < 0 else f for f in known.values())
     standing = tuple(replace(j, origin=T_WU @ j.origin) if j.parent < 0 else j for j in joints)
     free, kept, locked = without_locked(standing, based)
     if not free:
@@ -155,7 +155,7 @@ def without_locked(
     return tuple(free), kept, locked
 
 
-def motion(kind: str, a: Array, q: float) -> Array:
+def motion(kind: Kind, a: Array, q: float) -> Array:
     """T (4, 4) of a joint's moving side in its frame at q, by its unit axis; Rodrigues' formula."""
     T = np.eye(4)
     if kind == "prismatic":

@@ -43,9 +43,7 @@ class MeshFolders:
             if not folder.is_dir():
                 raise ModelError(f"package folder {folder}: no such folder")
 
-    def find(
-        self, name: str, what: str, base: Path | None = None, kind: str = "mesh file"
-    ) -> Path:
+    def find(self, name: str, what: str, base: Path | None = None, kind: str = "mesh file") -> Path:
         """The file that `name` means.
 
         Args:

@@ -1,7 +1,7 @@
 """From pinocchio's model of a URDF to joints and frames."""
 
-from pathlib import Path
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np

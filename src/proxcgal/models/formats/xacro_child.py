@@ -7,7 +7,6 @@ It imports nothing of this package.
 import glob
 import json
 import os
-import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -19,21 +18,24 @@ _MOST_UP = 4  # folders up to the package of a file
 _SEARCH = ("AMENT_PREFIX_PATH", "ROS_PACKAGE_PATH", "ROS_ROOT")
 
 
-class Arguments(dict):
+class Arguments(dict[str, str]):
     """xacro arguments that know which were asked for."""
 
     def __init__(self, given: dict[str, str]) -> None:
         """Of those that are given."""
         super().__init__(given)
-        self.given, self.asked = set(given), set()
+        self.given = set(given)
+        self.asked: set[str] = set()
 
     def __contains__(self, name: object) -> bool:
-        self.asked.add(name)
+        """Whether it is known."""
+        self.asked.add(str(name))
         return super().__contains__(name)
 
     def __getitem__(self, name: str) -> str:
+        """Its value."""
         self.asked.add(name)
-        return super().__getitem__(name)
+        return str(super().__getitem__(name))
 
 
 def main() -> None:
@@ -81,7 +83,7 @@ def main() -> None:
 
     def get_include_files(spec: str, symbols: object) -> object:
         pattern = xacro.abs_filename_spec(spec)
-        patterns[pattern] = sorted(glob.glob(pattern))
+        patterns[pattern] = sorted(glob.glob(pattern))  # noqa: PTH207  as xacro itself does
         return real_includes(spec, symbols)
 
     substitution_args._eval_env, substitution_args._eval_optenv = env, optenv
@@ -145,4 +147,4 @@ def listed(names: list[str]) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -53,7 +53,9 @@ class _Reader:
             if total > self._max_faces:
                 raise GeometryError(f"{self._path}: more than {self._max_faces} faces")
             if len(faces) > _MOST_PARTS:
-                raise GeometryError(f"{self._path}: more than {_MOST_PARTS} geometries in its scene")
+                raise GeometryError(
+                    f"{self._path}: more than {_MOST_PARTS} geometries in its scene"
+                )
         if not faces:
             raise GeometryError(f"{self._path}: no triangles in its scene")
         return np.concatenate(vertices) * self._unit(), np.concatenate(faces)
@@ -75,7 +77,9 @@ class _Reader:
 
     def _target(self, url: str | None, tag: str) -> ET.Element:
         if not url or not url.startswith("#"):
-            self._refuse(f"<{tag}> at '{(url or '')[:60]}'; only what is in the file itself is read")
+            self._refuse(
+                f"<{tag}> at '{(url or '')[:60]}'; only what is in the file itself is read"
+            )
         found = self._by_id.get(url[1:])
         if found is None or found.tag != tag:
             self._refuse(f"there is no <{tag}> of id '{url[1:61]}'")
@@ -136,7 +140,9 @@ class _Reader:
         except ValueError as error:
             self._refuse(f"<{element.tag}>: {error}")
         if count is not None and (len(values) != count or not np.isfinite(values).all()):
-            self._refuse(f"<{element.tag}> holds {len(values)} numbers; {count} finite ones are needed")
+            self._refuse(
+                f"<{element.tag}> holds {len(values)} numbers; {count} finite ones are needed"
+            )
         return values
 
     def _ints(self, element: ET.Element | None) -> Ints:
@@ -207,7 +213,7 @@ class _Reader:
                                     (("count", ""), ("stride", "1"), ("offset", "0")))  # fmt: skip
         except ValueError:
             self._refuse(f"accessor of source '{url[1:]}' without a count")
-        if not (0 <= first and max(columns) < stride and 0 <= count <= len(values)
+        if not (first >= 0 and max(columns) < stride and 0 <= count <= len(values)
                 and first + count * stride <= len(values)):  # fmt: skip
             self._refuse(
                 f"source '{url[1:]}' wants {count} positions, {stride} numbers each; "

@@ -56,7 +56,8 @@ def load_mesh(path: str | os.PathLike[str]) -> tuple[Array, Ints]:
     is_text = suffix not in _MAYBE_BINARY or b"\0" not in data
     if suffix != ".dae" and is_text and size > MAX_TEXT_BYTES:
         raise GeometryError(
-            f"{path}: {size} bytes of text; at most {MAX_TEXT_BYTES} are read: save it as binary STL"
+            f"{path}: {size} bytes of text; at most {MAX_TEXT_BYTES} are read: save it as "
+            "binary STL"
         )
     if suffix == ".dae":
         vertices, triangles = read_dae(path, MAX_FACES)

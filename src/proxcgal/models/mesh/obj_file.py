@@ -36,7 +36,7 @@ def read_obj(data: bytes, path: Path, max_faces: int) -> tuple[Array, Ints]:
     triangles = 0
     for number, line in enumerate(data.splitlines(), start=1):
         if b"#" in line:
-            line = line.split(b"#", 1)[0]  # noqa: PLW2901
+            line = line.split(b"#", 1)[0]
         tokens = line.split()
         if not tokens:
             continue
@@ -89,7 +89,7 @@ def _joined(lines: re.Match[bytes]) -> bytes:
 
 
 def _check_vertex(tokens: list[bytes], number: int, path: Path) -> None:
-    """x y z, with a weight or a colour after them."""
+    """See that it is x y z, with a weight or a colour after them."""
     count = len(tokens) - 1
     if count not in (3, 4, 6, 7):
         raise GeometryError(

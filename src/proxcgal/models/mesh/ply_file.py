@@ -134,12 +134,14 @@ def _text(tokens: list[bytes], at: int, element: _Element) -> tuple[_Columns, _L
             at += 1 + count
     if at > len(tokens):
         raise ValueError(f"{at - len(tokens)} values are missing")
-    return {}, {k: (np.array(v, np.int64), np.array(n, np.int64)) for k, (v, n) in lists.items()}, at
+    return (
+        {},
+        {k: (np.array(v, np.int64), np.array(n, np.int64)) for k, (v, n) in lists.items()},
+        at,
+    )
 
 
-def _binary(
-    body: bytes, at: int, element: _Element, order: str
-) -> tuple[_Columns, _Lists, int]:
+def _binary(body: bytes, at: int, element: _Element, order: str) -> tuple[_Columns, _Lists, int]:
     lists = [p for p in element.properties if p[2]]
     if not element.properties:
         return {}, {}, at

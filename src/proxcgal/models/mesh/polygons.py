@@ -6,7 +6,7 @@ import mapbox_earcut
 import numpy as np
 
 from proxcgal.core.errors import GeometryError
-from proxcgal.core.typing import Array, Ints
+from proxcgal.core.typing import Array, Bools, Ints
 from proxcgal.models.mesh.triangles import cross
 
 # The triangles of a face cover its outline's area to this share, else it crosses itself.
@@ -45,7 +45,10 @@ def triangulated(points: Array, corners: Ints, counts: Ints, what: str) -> Ints:
     check_rows(corners, np.repeat(np.arange(len(counts)), counts), len(points), what)
     if (counts == 3).all():
         return corners.reshape(-1, 3)
-    made, owner = [corners[start[counts == 3][:, None] + np.arange(3)]], [np.flatnonzero(counts == 3)]
+    made, owner = (
+        [corners[start[counts == 3][:, None] + np.arange(3)]],
+        [np.flatnonzero(counts == 3)],
+    )
     for n in np.unique(counts[counts > 3]):
         faces = np.flatnonzero(counts == n)
         rows = corners[start[faces][:, None] + np.arange(n)]
@@ -72,14 +75,14 @@ def check_rows(rows: Ints, faces: Ints, count: int, what: str) -> None:
         raise GeometryError(f"{what}: face {faces[bad]} has vertex {rows[bad]}; there are {count}")
 
 
-def _fans_turn_one_way(outlines: Array) -> np.ndarray:
+def _fans_turn_one_way(outlines: Array) -> Bools:
     """Whether the fan from the first corner covers each outline (m, n, 3) once, (m,)."""
     m, n = outlines.shape[:2]
     with np.errstate(over="ignore", invalid="ignore"):
         spokes = outlines[:, 1:] - outlines[:, :1]
-        parts = cross(
-            spokes[:, :-1].reshape(-1, 3), spokes[:, 1:].reshape(-1, 3)
-        ).reshape(m, n - 2, 3)
+        parts = cross(spokes[:, :-1].reshape(-1, 3), spokes[:, 1:].reshape(-1, 3)).reshape(
+            m, n - 2, 3
+        )
         normal = parts.sum(axis=1)
         along = np.einsum("mki,mi->mk", parts, normal)
         square = np.einsum("mi,mi->m", normal, normal)
@@ -89,7 +92,8 @@ def _fans_turn_one_way(outlines: Array) -> np.ndarray:
         flat = np.linalg.norm(parts, axis=2).sum(axis=1) <= 1e-12 * (spokes**2).sum(axis=(1, 2))
         one_way = (along >= -_AREA_TOLERANCE * square[:, None]).all(axis=1)
     finite = np.isfinite(outlines).all(axis=(1, 2))  # what is not is refused later, by its row
-    return ~finite | flat | (one_way & (square > 0) & (turn < 2 * np.pi))
+    clear: Bools = ~finite | flat | (one_way & (square > 0) & (turn < 2 * np.pi))
+    return clear
 
 
 def cut_by_ears(points: Array, rings: Sequence[Ints], what: str) -> Ints:

@@ -46,8 +46,8 @@ def read_stl(data: bytes, path: Path, max_faces: int) -> tuple[Array, Ints]:
 def _read_text(text: bytes, path: Path, max_faces: int) -> tuple[Array, Ints]:
     lines, solids = [], 0
     for line in text.splitlines():
-        word = line.split(maxsplit=1)[:1]
-        kind = word[0].lower() if word else b""
+        head = line.split(maxsplit=1)[:1]
+        kind = head[0].lower() if head else b""
         if kind == b"solid":
             solids += 1
         elif kind == b"endsolid":

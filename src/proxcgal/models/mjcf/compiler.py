@@ -5,29 +5,73 @@ limits. It imports nothing of this package, whose core would double the time it 
 
 A mesh file is not read here: a small box stands for it while MuJoCo compiles, and the geom's pose
 is brought back from the box's inertial frame to the mesh's own. The vertices are then those of the
-file, in double precision. Where a primitive is fitted to a mesh, or the mesh is given inline, MuJoCo
-has the real one.
+file, in double precision. Where a primitive is fitted to a mesh, or the mesh is given inline,
+MuJoCo has the real one.
 """
 
 import json
-import sys
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
 
+_Reply = dict[str, Any]
+_Arrays = dict[str, np.ndarray]
+
 _GEOM = mujoco.mjtGeom
 _BOX = np.array([[x, y, z] for x in (-1, 1) for y in (-2, 2) for z in (-3, 3)]) * 0.01
-_BOX_FACES = np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
-                       [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]])  # fmt: skip
+_BOX_FACES = np.array([
+    [0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
+    [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3],
+])  # fmt: skip
 _EQUALITY = {int(kind): kind.name.removeprefix("mjEQ_").lower() for kind in
              (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD, mujoco.mjtEq.mjEQ_JOINT,
               mujoco.mjtEq.mjEQ_TENDON)}  # fmt: skip
+_KEPT = (
+    "body_parentid",
+    "body_pos",
+    "body_quat",
+    "body_mocapid",
+    "jnt_type",
+    "jnt_bodyid",
+    "jnt_pos",
+    "jnt_axis",
+    "jnt_limited",
+    "jnt_range",
+    "jnt_qposadr",
+    "qpos0",
+    "geom_type",
+    "geom_bodyid",
+    "geom_dataid",
+    "geom_pos",
+    "geom_quat",
+    "geom_size",
+    "geom_contype",
+    "geom_conaffinity",
+    "geom_group",
+    "site_bodyid",
+    "site_pos",
+    "site_quat",
+    "mesh_pos",
+    "mesh_quat",
+    "mesh_vertadr",
+    "mesh_vertnum",
+    "mesh_faceadr",
+    "mesh_facenum",
+    "mesh_vert",
+    "mesh_face",
+    "tendon_adr",
+    "tendon_num",
+    "tendon_limited",
+    "wrap_type",
+    "wrap_objid",
+)
 # Meshes that only MuJoCo reads.
 _OWN_FORMATS = (".msh",)
 
 
-class Refused(Exception):
+class RefusedError(Exception):
     """What is not read, in words."""
 
 
@@ -38,7 +82,7 @@ def main() -> None:
         reply, arrays = compiled(request["path"], request["meshes"])
         if arrays:
             np.savez("reply.npz", **arrays)
-    except Refused as error:
+    except RefusedError as error:
         reply = {"error": str(error)}
     except MemoryError:
         reply = {"error": "reading it takes too much memory"}
@@ -48,7 +92,7 @@ def main() -> None:
     Path("reply.json").write_text(json.dumps(reply))
 
 
-def compiled(path: str, files: dict[str, str] | None) -> tuple[dict, dict]:
+def compiled(path: str, files: dict[str, str] | None) -> tuple[_Reply, _Arrays]:
     """The compiled model as plain data; or, where real meshes are needed and `files` is None, them.
 
     `files` gives the path of each mesh file, by the mesh's name.
@@ -61,11 +105,11 @@ def compiled(path: str, files: dict[str, str] | None) -> tuple[dict, dict]:
     fitted = {g.meshname for g in spec.geoms if g.meshname and g.type != _GEOM.mjGEOM_MESH}
     fitted |= {name for name in meshes if Path(meshes[name].file).suffix.lower() in _OWN_FORMATS}
     fitted &= set(meshes)
-    if fitted and files is None:
+    if files is None and fitted:
         return {"meshes": told, "needs": sorted(fitted)}, {}
     for name, mesh in meshes.items():
         if name in fitted:
-            mesh.file = files[name]
+            mesh.file = (files or {})[name]
         else:
             _replace(mesh)
     for of in {id(m.compiler): m.compiler for m in meshes.values()}.values():
@@ -79,7 +123,7 @@ def compiled(path: str, files: dict[str, str] | None) -> tuple[dict, dict]:
     return reply | _names(model), _arrays(model)
 
 
-def _told(mesh: "mujoco.MjsMesh", spec: "mujoco.MjSpec") -> dict:
+def _told(mesh: "mujoco.MjsMesh", spec: "mujoco.MjSpec") -> _Reply:
     folder = mesh.compiler.meshdir or spec.meshdir or ""
     file = mesh.file
     if spec.strippath:
@@ -98,19 +142,21 @@ def _check(spec: "mujoco.MjSpec") -> None:
             to = f"'{bond.name2}'" if bond.name2 else "a constant"
             what = f"joint '{bond.name1}' is bound to {to} (equality{name})"
         else:
-            what = f"'{bond.name1}' is bound to '{bond.name2 or 'the world'}' ({kind} equality{name})"
-        raise Refused(
+            what = (
+                f"'{bond.name1}' is bound to '{bond.name2 or 'the world'}' ({kind} equality{name})"
+            )
+        raise RefusedError(
             f"{what}; joints that follow others are not read: take a model without that part and "
             "put it on with attach_mesh"
         )
     for flex in spec.flexes:
-        raise Refused(f"flex '{flex.name}' bends; rigid bodies are read")
+        raise RefusedError(f"flex '{flex.name}' bends; rigid bodies are read")
     for geom in spec.geoms:
         if geom.type == _GEOM.mjGEOM_SDF:
-            raise Refused(f"geom '{geom.name}' of body '{geom.parent.name}' is an sdf; primitives "
+            raise RefusedError(f"geom '{geom.name}' of body '{geom.parent.name}' is an sdf; primitives "
                           "and meshes are read")  # fmt: skip
         if geom.type == _GEOM.mjGEOM_HFIELD and geom.parent.name != "world":
-            raise Refused(f"geom '{geom.name}' of body '{geom.parent.name}' is a height field; "
+            raise RefusedError(f"geom '{geom.name}' of body '{geom.parent.name}' is a height field; "
                           "primitives and meshes are read")  # fmt: skip
 
 
@@ -138,7 +184,7 @@ def _replace(mesh: "mujoco.MjsMesh") -> None:
     mesh.userface = _BOX_FACES.reshape(-1)
 
 
-def _names(model: "mujoco.MjModel") -> dict:
+def _names(model: "mujoco.MjModel") -> _Reply:
     def names(kind: int, count: int) -> list[str]:
         return [mujoco.mj_id2name(model, kind, i) or "" for i in range(count)]
 
@@ -154,13 +200,8 @@ def _names(model: "mujoco.MjModel") -> dict:
 
 
 def _arrays(model: "mujoco.MjModel") -> dict[str, np.ndarray]:
-    kept = """body_parentid body_pos body_quat body_mocapid jnt_type jnt_bodyid jnt_pos jnt_axis
-        jnt_limited jnt_range jnt_qposadr qpos0 geom_type geom_bodyid geom_dataid geom_pos geom_quat
-        geom_size geom_contype geom_conaffinity geom_group site_bodyid site_pos site_quat mesh_pos
-        mesh_quat mesh_vertadr mesh_vertnum mesh_faceadr mesh_facenum mesh_vert mesh_face tendon_adr
-        tendon_num tendon_limited wrap_type wrap_objid""".split()
-    return {name: np.asarray(getattr(model, name)) for name in kept}
+    return {name: np.asarray(getattr(model, name)) for name in _KEPT}
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

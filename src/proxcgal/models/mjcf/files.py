@@ -49,9 +49,7 @@ class ModelFiles:
             found = self._open(element.get("file", ""), "<model>", path, depth, {"mujoco"})
             self.bases += [file.parent for file in found if file.parent not in self.bases]
 
-    def _open(
-        self, name: str, what: str, path: Path, depth: int, roots: set[str]
-    ) -> list[Path]:
+    def _open(self, name: str, what: str, path: Path, depth: int, roots: set[str]) -> list[Path]:
         """Read all files that MuJoCo may mean by a name: it tries more than one folder."""
         bases = dict.fromkeys([path.parent, self._path.parent, *self.bases])
         maybe = dict.fromkeys(self._folders.check(base / name, name, what) for base in bases)

@@ -12,7 +12,7 @@ from proxcgal.core.errors import ModelError
 from proxcgal.core.typing import Array
 from proxcgal.models.description import Frame, Joint, listed
 from proxcgal.models.formats.child import run_limited
-from proxcgal.models.formats.parts import WORLD, Shape, motion
+from proxcgal.models.formats.parts import WORLD, Kind, Shape, motion
 from proxcgal.models.formats.paths import MeshFolders
 from proxcgal.models.mesh.shapes import box, capsule, cylinder, ellipsoid
 from proxcgal.models.mjcf.files import ModelFiles
@@ -127,7 +127,9 @@ class _Reader:
             if self._parent[body]:
                 top[body] = top[self._parent[body]]
         shown = {int(top[b]) for b in [*m["geom_bodyid"], *m["jnt_bodyid"]]}
-        gone = {b for b in range(1, n) if m["body_mocapid"][top[b]] >= 0 or int(top[b]) not in shown}
+        gone = {
+            b for b in range(1, n) if m["body_mocapid"][top[b]] >= 0 or int(top[b]) not in shown
+        }
         return gone
 
     def _check_joints(self) -> None:
@@ -179,7 +181,7 @@ class _Reader:
             row, T = place[self._parent[body]]
             T = T @ self._pose("body", body)
             for j in np.flatnonzero(m["jnt_bodyid"] == body):
-                kind = "prismatic" if m["jnt_type"][j] == _SLIDE else "revolute"
+                kind: Kind = "prismatic" if m["jnt_type"][j] == _SLIDE else "revolute"
                 axis = m["jnt_axis"][j] / np.linalg.norm(m["jnt_axis"][j])
                 there, back = np.eye(4), np.eye(4)
                 there[:3, 3], back[:3, 3] = m["jnt_pos"][j], -m["jnt_pos"][j]
@@ -238,7 +240,9 @@ class _Reader:
         if name in self._reply["stubs"]:
             told = self._reply["meshes"][name]
             # MuJoCo moves a mesh by refpos and refquat first, then scales it.
-            moved_by = np.linalg.inv(pose_of(np.array(told["refpos"]), np.array(told["refquat"])))
+            moved_by: Array = np.linalg.inv(
+                pose_of(np.array(told["refpos"]), np.array(told["refquat"]))
+            )
             return Shape(T @ np.linalg.inv(self._pose("mesh", mesh)), file=self._paths[name],
                          scale=np.array(told["scale"]), before_scale=moved_by)  # fmt: skip
         first, face = m["mesh_vertadr"][mesh], m["mesh_faceadr"][mesh]
