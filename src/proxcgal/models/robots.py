@@ -199,7 +199,8 @@ def describe_robot(
     if builtin is not None:
         if package_dirs or base or xacro_args:
             raise ConfigError(
-                f"robot '{name_or_path}' is built in; package_dirs, base and xacro_args are for files"
+                f"robot '{name_or_path}' is built in; package_dirs, base and xacro_args are for "
+                "files"
             )
         return builtin.describe()
     path = _file(name_or_path)

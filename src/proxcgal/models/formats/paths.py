@@ -78,10 +78,21 @@ class MeshFolders:
             ModelError: it lies outside of the folders.
         """
         path = Path(os.path.normpath(path))
-        folders = [*self.own, *self.package_dirs, *self.packages.values()]
-        if not any(path.is_relative_to(folder) for folder in folders):
-            self._outside(name, what, path, folders)
+        if not self._within(path):
+            self._outside(name, what, path, self._all)
         return path
+
+    def holds(self, path: Path) -> bool:
+        """Whether that is a file within the folders."""
+        path = Path(os.path.normpath(path))
+        return self._within(path) and path.is_file()
+
+    @property
+    def _all(self) -> list[Path]:
+        return [*self.own, *self.package_dirs, *self.packages.values()]
+
+    def _within(self, path: Path) -> bool:
+        return any(path.is_relative_to(folder) for folder in self._all)
 
     def _in_package(self, name: str, what: str) -> Path:
         package, _, rest = name.split("://", 1)[1].partition("/")

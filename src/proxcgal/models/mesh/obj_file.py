@@ -10,7 +10,8 @@ from proxcgal.core.typing import Array, Ints
 from proxcgal.models.mesh.polygons import triangulated
 
 # What says nothing of the surface: names, materials, normals, points and lines.
-_PASSED = {b"vt", b"vn", b"vp", b"g", b"o", b"s", b"p", b"l", b"mg", b"usemtl", b"mtllib", b"usemap",
+_PASSED = {b"vt", b"vn", b"vp", b"g", b"o", b"s", b"p", b"l", b"mg", b"usemtl", b"mtllib",
+          b"usemap",
            b"maplib", b"bevel", b"c_interp", b"d_interp", b"lod", b"shadow_obj",
            b"trace_obj"}  # fmt: skip
 _ROW_LIMIT = 2**31

@@ -29,44 +29,13 @@ _EQUALITY = {int(kind): kind.name.removeprefix("mjEQ_").lower() for kind in
              (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD, mujoco.mjtEq.mjEQ_JOINT,
               mujoco.mjtEq.mjEQ_TENDON)}  # fmt: skip
 _KEPT = (
-    "body_parentid",
-    "body_pos",
-    "body_quat",
-    "body_mocapid",
-    "jnt_type",
-    "jnt_bodyid",
-    "jnt_pos",
-    "jnt_axis",
-    "jnt_limited",
-    "jnt_range",
-    "jnt_qposadr",
-    "qpos0",
-    "geom_type",
-    "geom_bodyid",
-    "geom_dataid",
-    "geom_pos",
-    "geom_quat",
-    "geom_size",
-    "geom_contype",
-    "geom_conaffinity",
-    "geom_group",
-    "site_bodyid",
-    "site_pos",
-    "site_quat",
-    "mesh_pos",
-    "mesh_quat",
-    "mesh_vertadr",
-    "mesh_vertnum",
-    "mesh_faceadr",
-    "mesh_facenum",
-    "mesh_vert",
-    "mesh_face",
-    "tendon_adr",
-    "tendon_num",
-    "tendon_limited",
-    "wrap_type",
-    "wrap_objid",
-)
+    "body_parentid", "body_pos", "body_quat", "body_mocapid", "jnt_type", "jnt_bodyid",
+    "jnt_pos", "jnt_axis", "jnt_limited", "jnt_range", "jnt_qposadr", "qpos0", "geom_type",
+    "geom_bodyid", "geom_dataid", "geom_pos", "geom_quat", "geom_size", "geom_contype",
+    "geom_conaffinity", "geom_group", "site_bodyid", "site_pos", "site_quat", "mesh_pos",
+    "mesh_quat", "mesh_vertadr", "mesh_vertnum", "mesh_faceadr", "mesh_facenum", "mesh_vert",
+    "mesh_face", "tendon_adr", "tendon_num", "tendon_limited", "wrap_type", "wrap_objid",
+)  # fmt: skip
 # Meshes that only MuJoCo reads.
 _OWN_FORMATS = (".msh",)
 
@@ -81,7 +50,7 @@ def main() -> None:
     try:
         reply, arrays = compiled(request["path"], request["meshes"])
         if arrays:
-            np.savez("reply.npz", **arrays)
+            np.savez("reply.npz", **arrays)  # type: ignore[arg-type]
     except RefusedError as error:
         reply = {"error": str(error)}
     except MemoryError:
@@ -152,12 +121,11 @@ def _check(spec: "mujoco.MjSpec") -> None:
     for flex in spec.flexes:
         raise RefusedError(f"flex '{flex.name}' bends; rigid bodies are read")
     for geom in spec.geoms:
+        what = f"geom '{geom.name}' of body '{geom.parent.name}'"
         if geom.type == _GEOM.mjGEOM_SDF:
-            raise RefusedError(f"geom '{geom.name}' of body '{geom.parent.name}' is an sdf; primitives "
-                          "and meshes are read")  # fmt: skip
+            raise RefusedError(f"{what} is an sdf; primitives and meshes are read")
         if geom.type == _GEOM.mjGEOM_HFIELD and geom.parent.name != "world":
-            raise RefusedError(f"geom '{geom.name}' of body '{geom.parent.name}' is a height field; "
-                          "primitives and meshes are read")  # fmt: skip
+            raise RefusedError(f"{what} is a height field; primitives and meshes are read")
 
 
 def _strip(spec: "mujoco.MjSpec") -> None:

@@ -1,6 +1,5 @@
 """The files that an MJCF is made of: found within their folders, before MuJoCo opens any."""
 
-import os
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -72,11 +71,11 @@ class ModelFiles:
             ModelError: none, more than one that it may be, or one outside of the folders.
         """
         bases = [base / folder for base in self.bases]
-        there = {Path(os.path.normpath(base / name)) for base in bases if (base / name).is_file()}
-        if len(there) > 1:
+        there = {base / name for base in bases if self._folders.holds(base / name)}
+        if len({file.read_bytes() for file in there}) > 1:
             raise ModelError(
                 f"{self._path}: {what} may be {' or '.join(sorted(map(str, there)))}; give the "
                 "files names that differ"
             )
-        base = next((base for base in bases if (base / name).is_file()), bases[0])
+        base = next((base for base in bases if base / name in there), bases[0])
         return self._folders.find(name, what, base)

@@ -9,6 +9,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from proxcgal.core.errors import ModelError
+from proxcgal.core.transforms import inverse
 from proxcgal.core.typing import Array
 from proxcgal.models.description import Frame, Joint, listed
 from proxcgal.models.formats.child import run_limited
@@ -240,9 +241,7 @@ class _Reader:
         if name in self._reply["stubs"]:
             told = self._reply["meshes"][name]
             # MuJoCo moves a mesh by refpos and refquat first, then scales it.
-            moved_by: Array = np.linalg.inv(
-                pose_of(np.array(told["refpos"]), np.array(told["refquat"]))
-            )
+            moved_by = inverse(pose_of(np.array(told["refpos"]), np.array(told["refquat"])))
             return Shape(T @ np.linalg.inv(self._pose("mesh", mesh)), file=self._paths[name],
                          scale=np.array(told["scale"]), before_scale=moved_by)  # fmt: skip
         first, face = m["mesh_vertadr"][mesh], m["mesh_faceadr"][mesh]
