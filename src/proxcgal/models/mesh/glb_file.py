@@ -147,18 +147,21 @@ class _Reader:
             points = self._accessor(part["attributes"]["POSITION"]).astype(np.float64)
             if points.shape[1] != 3:
                 self._refuse("positions of other than 3 numbers")
-            rows = (
-                self._accessor(part["indices"]).astype(np.int64).reshape(-1)
-                if "indices" in part
-                else np.arange(len(points))
-            )
+            rows = self._rows(part["indices"]) if "indices" in part else np.arange(len(points))
             if mode != _TRIANGLES:
                 rows = strip(rows, mode == _FAN).reshape(-1)
             if len(rows) % 3:
                 self._refuse(f"{len(rows)} corners; 3 a face are needed")
             yield points, triangulated(points, rows, np.full(len(rows) // 3, 3), str(self._path))
 
-    def _accessor(self, row: Any) -> Array:
+    def _rows(self, accessor: Any) -> Ints:
+        found = self._accessor(accessor)
+        if found.dtype.kind != "u":
+            self._refuse(f"accessor {accessor} of indices holds other than unsigned integers")
+        rows: Ints = found.astype(np.int64).reshape(-1)
+        return rows
+
+    def _accessor(self, row: Any) -> Any:
         found = self._item("accessors", row)
         if "sparse" in found or "bufferView" not in found:
             self._refuse(f"accessor {row} is sparse, which is not read")
@@ -177,6 +180,6 @@ class _Reader:
                 or (count and within + (count - 1) * stride + size > length)):  # fmt: skip
             self._refuse(f"accessor {row} reaches past its data")
         if not count:
-            return np.empty((0, width))
+            return np.empty((0, width), kind)
         return np.ndarray((count, width), kind, self._binary, first + within,
                           (stride, kind.itemsize)).copy()  # fmt: skip
