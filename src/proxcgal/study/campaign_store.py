@@ -90,16 +90,15 @@ class CampaignStore(Closing):
         found = {}
         for key in keys:
             path = self._trials / f"{key}.json"
-            with contextlib.suppress(FileNotFoundError):
-                try:
-                    content = json.loads(path.read_bytes())
-                except RecursionError:
-                    raise _not_a_trial(path, "is nested too deep") from None
-                except ValueError:  # half of it
-                    continue
-                except OSError as error:
-                    raise _not_a_trial(path, f"cannot be read: {error.strerror}") from error
-                found[key] = _outcome(content, key, path)
+            try:
+                content = json.loads(path.read_bytes())
+            except RecursionError:
+                raise _not_a_trial(path, "is nested too deep") from None
+            except (FileNotFoundError, ValueError):  # half of it
+                continue
+            except OSError as error:
+                raise _not_a_trial(path, f"cannot be read: {error.strerror}") from None
+            found[key] = _outcome(content, key, path)
         return found
 
 
