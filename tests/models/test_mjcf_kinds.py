@@ -139,6 +139,7 @@ KINDS = {
     "camera and light": arm(tail="<worldbody><camera/><light/><site name='mark'/></worldbody>"),
     "empty body beside": arm(tail='<worldbody><body name="target" mocap="true"><geom size=".1"/>'
                              "</body></worldbody>"),
+    "arm on a mocap body": arm(root='mocap="true" pos="0 0 .5"'),
     "nameless": arm('<joint axis="0 1 0"/>'),
     "look and contact": arm(geom='<geom type="box" size=".1 .1 .1" contype="0" conaffinity="0"/>'
                             '<geom type="sphere" size=".05" group="3"/>'),

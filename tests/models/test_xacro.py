@@ -126,7 +126,9 @@ def test_its_own_package_is_found(tmp_path: Path) -> None:
     path = write(package / "urdf" / "a.xacro",
                  "${xacro.load_yaml('$(find my_arm)/config/limits.yaml')['up']}")  # fmt: skip
     assert upper(path) == 2.25
-    with pytest.raises(px.ModelError, match="package 'other' is not found; package_dirs"):
+    with pytest.raises(
+        px.ModelError, match=r"b\.xacro: xacro: package 'other' is not found; package_dirs"
+    ):
         upper(write(package / "urdf" / "b.xacro", "$(find other)"))
 
 

@@ -55,7 +55,7 @@ class CampaignStore(Closing):
         with contextlib.ExitStack() as opened:
             try:
                 folder.mkdir(parents=True, exist_ok=True)
-                hold(folder, opened)
+                hold(folder, opened, "campaign")
                 self._open(folder, description)
             except OSError as error:
                 raise ConfigError(
@@ -185,7 +185,7 @@ def _shown(value: Any) -> str:
     return "not told" if value is None else json.dumps(value)
 
 
-def hold(folder: Path, opened: contextlib.ExitStack) -> None:
+def hold(folder: Path, opened: contextlib.ExitStack, what: str = "folder") -> None:
     """Locks a folder for this process alone, until `opened` is closed or the process ends.
 
     Raises:
@@ -197,6 +197,6 @@ def hold(folder: Path, opened: contextlib.ExitStack) -> None:
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        raise ConfigError(f"--out {folder}: another process is at work on this folder") from None
+        raise ConfigError(f"--out {folder}: another process is at work on this {what}") from None
     except OSError:
         pass  # a file system without locks

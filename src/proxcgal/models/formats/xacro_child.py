@@ -114,6 +114,8 @@ def said(error: BaseException) -> str:
                 f"argument '{name}' has no default and is not given: xacro_args={{'{name}': ...}}, "
                 f"or --xacro-arg {name}=..."
             )
+        if isinstance(inner, substitution_args.SubstitutionException):
+            return str(inner)
         inner = getattr(inner, "exc", None)
     if isinstance(error, FileNotFoundError):
         return f"no file '{error.filename}'"

@@ -121,17 +121,19 @@ class _Reader:
         return [sites[b][0] if len(sites.get(b, ())) == 1 else self._bodies[b] for b in ends]
 
     def _props(self) -> set[int]:
-        """Bodies at the top that are no part of a robot, with what they carry."""
+        """Bodies at the top that are no part of a robot, with what they carry.
+
+        An arm may stand on a body that is moved by hand (mocap); without joints that is a mark.
+        """
         m, n = self._m, len(self._parent)
         top = np.arange(n)
         for body in range(1, n):
             if self._parent[body]:
                 top[body] = top[self._parent[body]]
-        shown = {int(top[b]) for b in [*m["geom_bodyid"], *m["jnt_bodyid"]]}
-        gone = {
-            b for b in range(1, n) if m["body_mocapid"][top[b]] >= 0 or int(top[b]) not in shown
-        }
-        return gone
+        moving = {int(top[b]) for b in m["jnt_bodyid"]}
+        shown = moving | {int(top[b]) for b in m["geom_bodyid"]}
+        by_hand = {b for b in range(1, n) if m["body_mocapid"][b] >= 0} - moving
+        return {b for b in range(1, n) if int(top[b]) in by_hand or int(top[b]) not in shown}
 
     def _check_joints(self) -> None:
         for joint, kind in enumerate(self._m["jnt_type"]):
