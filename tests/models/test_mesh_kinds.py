@@ -265,7 +265,7 @@ REFUSED = {
     "surface.obj": (as_obj(BOX) + "cstype bezier\n", "'cstype' is not read"),
     "underscore.obj": (as_obj(BOX).replace("v 0.0", "v 0_0", 1), "not three numbers"),
     "four.off": (as_off(BOX).replace("OFF", "4OFF"), "begins with '4OFF'"),
-    "cut.off": (as_off(BOX)[:-12], "lines; 1. are there"),
+    "cut.off": (as_off(BOX)[:-12], r"lines; 1\d are there|fewer corners than it says"),
     "short face.off": (as_off(BOX).replace("3 0 1 3", "4 0 1 3"), "fewer corners than it says"),
     "cut.ply": (as_binary_ply(BOX, "<")[:-3], "element 'face' is cut off"),
     "longer.ply": (as_ply(BOX) + "1 2 3\n", "more data than its header says"),
@@ -302,6 +302,16 @@ def test_what_cannot_be_read_whole_is_refused(tmp_path: Path, name: str) -> None
     with pytest.raises(px.GeometryError, match=said) as caught:
         load_mesh(path)
     assert path.name in str(caught.value)
+
+
+def test_text_that_takes_too_long_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("proxcgal.models.mesh.files.MAX_TEXT_BYTES", 100)
+    for name in ("plain.obj", "plain.off", "plain.ply", "text.stl"):
+        with pytest.raises(px.GeometryError, match="bytes of text; at most 100 are read"):
+            load_mesh(write(tmp_path, name))
+    load_mesh(write(tmp_path, "binary.stl"))
 
 
 def test_a_face_that_crosses_itself_loses_no_part(tmp_path: Path) -> None:

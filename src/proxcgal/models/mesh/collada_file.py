@@ -136,7 +136,7 @@ class _Reader:
 
     def _floats(self, element: ET.Element, count: int | None = None) -> Array:
         try:
-            values = np.array((element.text or "").split(), dtype=np.float64)
+            values = np.fromstring((element.text or "").strip(), dtype=np.float64, sep=" ")
         except ValueError as error:
             self._refuse(f"<{element.tag}>: {error}")
         if count is not None and (len(values) != count or not np.isfinite(values).all()):
@@ -148,7 +148,7 @@ class _Reader:
     def _ints(self, element: ET.Element | None) -> Ints:
         try:
             text = "" if element is None else element.text or ""
-            return np.array(text.split(), dtype=np.int64)
+            return np.fromstring(text.strip(), dtype=np.int64, sep=" ")
         except (ValueError, OverflowError) as error:
             self._refuse(f"an index that is none: {error}")
 

@@ -16,6 +16,7 @@ from proxcgal.models.mesh.polygons import triangulated
 _TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
+_MOST_JSON = 16 * 2**20  # [bytes]
 _MOST_PARTS = 10_000
 _MOST_NESTED = 64
 _APPEARANCE = ("KHR_materials_", "KHR_texture_", "KHR_lights_", "EXT_texture_")
@@ -69,6 +70,8 @@ class _Reader:
                 self._refuse("cut off within a chunk")
             chunks.setdefault(kind, data[at + 8 : at + 8 + size])
             at += 8 + size
+        if len(chunks.get(b"JSON", b"")) > _MOST_JSON:
+            self._refuse(f"more than {_MOST_JSON} bytes of JSON")
         try:
             self._json: dict[str, Any] = json.loads(chunks[b"JSON"])
         except (KeyError, ValueError, RecursionError):

@@ -1,6 +1,8 @@
 """Wavefront OBJ files: vertices and faces."""
 
+import io
 import re
+from array import array
 from pathlib import Path
 
 import numpy as np
@@ -29,13 +31,13 @@ def read_obj(data: bytes, path: Path, max_faces: int) -> tuple[Array, Ints]:
         GeometryError: names the line.
     """
     data = data.removeprefix(b"\xef\xbb\xbf")
+    if b"\n" not in data:  # lines as old Macs end them
+        data = data.replace(b"\r", b"\n")
     if b"\\" in data:  # the lines that follow keep their numbers
         data = _CONTINUED.sub(_joined, data)
-    vertices: list[list[bytes]] = []
-    corners: list[int] = []
-    counts: list[int] = []
+    vertices, corners, counts = array("d"), array("q"), array("q")
     triangles = 0
-    for number, line in enumerate(data.splitlines(), start=1):
+    for number, line in enumerate(io.BytesIO(data), start=1):
         if b"#" in line:
             line = line.split(b"#", 1)[0]
         tokens = line.split()
@@ -44,9 +46,14 @@ def read_obj(data: bytes, path: Path, max_faces: int) -> tuple[Array, Ints]:
         kind = tokens[0]
         if kind == b"v":
             _check_vertex(tokens, number, path)
-            vertices.append(tokens[1:4])
+            try:
+                vertices.extend(map(float, tokens[1:4]))
+            except ValueError:
+                raise GeometryError(
+                    f"{path}, line {number}: a vertex is not three numbers"
+                ) from None
         elif kind in (b"f", b"fo"):
-            known = len(vertices)
+            known = len(vertices) // 3
             try:
                 given = [int(token.split(b"/", 1)[0]) for token in tokens[1:]]
             except ValueError:
@@ -65,7 +72,7 @@ def read_obj(data: bytes, path: Path, max_faces: int) -> tuple[Array, Ints]:
                     f"{path}, line {number}: face {len(counts)} has vertex {outside}; "
                     f"{known} are known there"
                 )
-            corners += rows
+            corners.extend(rows)
             counts.append(len(rows))
             triangles += len(rows) - 2
             if triangles > max_faces:
@@ -75,12 +82,7 @@ def read_obj(data: bytes, path: Path, max_faces: int) -> tuple[Array, Ints]:
                 f"{path}, line {number}: '{kind.decode('latin-1')[:40]}' is not read; v and f are, "
                 "and what says nothing of the surface is passed over"
             )
-    try:
-        points = np.array(vertices, dtype=np.float64).reshape(-1, 3)
-    except ValueError:
-        raise GeometryError(f"{path}: a vertex is not three numbers") from None
-    if any(b"_" in token for row in vertices for token in row):
-        raise GeometryError(f"{path}: a vertex is not three numbers")
+    points = np.array(vertices).reshape(-1, 3)
     return points, triangulated(points, np.array(corners), np.array(counts), str(path))
 
 
@@ -97,6 +99,8 @@ def _check_vertex(tokens: list[bytes], number: int, path: Path) -> None:
             f"{path}, line {number}: a vertex of {count} numbers; 3 are needed, 4 with a weight, "
             "6 or 7 with a colour"
         )
+    if any(b"_" in token for token in tokens[1:4]):
+        raise GeometryError(f"{path}, line {number}: a vertex is not three numbers")
     if count == 4 and tokens[4] not in (b"1", b"1.0") and not _is_one(tokens[4]):
         raise GeometryError(f"{path}, line {number}: a vertex with a weight other than 1")
 

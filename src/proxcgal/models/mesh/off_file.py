@@ -1,5 +1,8 @@
 """OFF files (Geomview), as text."""
 
+import io
+from array import array
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -18,51 +21,58 @@ def read_off(data: bytes, path: Path, max_faces: int) -> tuple[Array, Ints]:
     Raises:
         GeometryError: another kind of OFF, too few or too many lines, what is not a number.
     """
-    text = data.removeprefix(b"\xef\xbb\xbf")
-    lines = [tokens for line in text.splitlines() if (tokens := line.split(b"#", 1)[0].split())]
-    head = lines[0][0] if lines else b""
-    if head not in _HEADERS or (len(lines[0]) > 1 and lines[0][1] == b"BINARY"):
-        found = " ".join(token.decode("latin-1") for token in lines[0][:2]) if lines else ""
+    lines = _lines(data.removeprefix(b"\xef\xbb\xbf"))
+    first = next(lines, [b""])
+    head = first[0]
+    if head not in _HEADERS or first[1:2] == [b"BINARY"]:
+        found = " ".join(token.decode("latin-1") for token in first[:2])
         raise GeometryError(
             f"{path}: begins with '{found[:40]}'; {', '.join(h.decode() for h in _HEADERS)} as "
             "text are read"
         )
-    lines = ([lines[0][1:]] if len(lines[0]) > 1 else []) + lines[1:]
+    numbers = first[1:] or next(lines, [])
     try:
-        n_vertices, n_faces = (int(token) for token in lines[0][:2])
-    except (IndexError, ValueError):
+        n_vertices, n_faces = (int(token) for token in numbers[:2])
+    except ValueError:
         raise GeometryError(f"{path}: no numbers of vertices and faces in its head") from None
     if not (0 <= n_vertices <= 3 * max_faces and 0 <= n_faces <= max_faces):
         raise GeometryError(
             f"{path}: {n_vertices} vertices, {n_faces} faces; at most {max_faces} faces are taken"
         )
-    if len(lines) != 1 + n_vertices + n_faces:
-        raise GeometryError(
-            f"{path}: {n_vertices} vertices and {n_faces} faces, a line each, are "
-            f"{n_vertices + n_faces} lines; {len(lines) - 1} are there"
-        )
-    allowed = _HEADERS[head] + ((6, 7) if head == b"OFF" else ())  # many write no C
-    rows = lines[1 : 1 + n_vertices]
-    if rows and ({len(row) for row in rows} - set(allowed)):
-        raise GeometryError(
-            f"{path}: a vertex of another number of values than {' or '.join(map(str, allowed))}"
-        )
-    corners: list[int] = []
-    counts: list[int] = []
+    # Many write colours without the C.
+    allowed = {*_HEADERS[head], *((6, 7) if head == b"OFF" else ())}
+    points, corners, counts = array("d"), array("q"), array("q")
+    count = -1
     try:
-        points = np.array([row[:3] for row in rows], dtype=np.float64).reshape(-1, 3)
-        for row in lines[1 + n_vertices :]:
-            count = int(row[0])
-            if not 0 <= count < len(row):
+        for count, row in enumerate(lines):
+            if count < n_vertices:
+                if len(row) not in allowed or any(b"_" in token for token in row):
+                    raise GeometryError(
+                        f"{path}: vertex {count} has {len(row)} values; "
+                        f"{' or '.join(map(str, sorted(allowed)))} numbers are needed"
+                    )
+                points.extend(map(float, row[:3]))
+                continue
+            size = int(row[0])
+            if not 0 <= size < len(row):
                 raise GeometryError(f"{path}: face {len(counts)} has fewer corners than it says")
-            corners += [int(token) for token in row[1 : 1 + count]]
-            counts.append(count)
+            corners.extend(map(int, row[1 : 1 + size]))
+            counts.append(size)
     except (ValueError, OverflowError) as error:
         if isinstance(error, GeometryError):
             raise
         raise GeometryError(f"{path}: not a number: {error}") from None
-    try:
-        rows_of = np.array(corners, dtype=np.int64)
-    except OverflowError:
-        raise GeometryError(f"{path}: a vertex index that is none") from None
-    return points, triangulated(points, rows_of, np.array(counts, np.int64), str(path))
+    if count + 1 != n_vertices + n_faces:
+        raise GeometryError(
+            f"{path}: {n_vertices} vertices and {n_faces} faces, a line each, are "
+            f"{n_vertices + n_faces} lines; {count + 1} are there"
+        )
+    vertices = np.array(points).reshape(-1, 3)
+    return vertices, triangulated(vertices, np.array(corners), np.array(counts), str(path))
+
+
+def _lines(text: bytes) -> Iterator[list[bytes]]:
+    """The words of each line that has any, comments left out."""
+    for line in io.BytesIO(text):
+        if words := line.split(b"#", 1)[0].split():
+            yield words

@@ -1,6 +1,10 @@
 """PLY files, text and binary."""
 
+import io
+from array import array
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -41,15 +45,15 @@ def read_ply(data: bytes, path: Path, max_faces: int) -> tuple[Array, Ints]:
     points: Array = np.empty((0, 3))
     corners: Ints = np.empty(0, np.int64)
     counts: Ints = np.empty(0, np.int64)
-    tokens = body.split() if not order else []
+    tokens = (token for line in io.BytesIO(body) for token in line.split())
     at = 0
     for element in elements:
         try:
             if order:
                 columns, lists, at = _binary(body, at, element, order)
             else:
-                columns, lists, at = _text(tokens, at, element)
-        except (ValueError, IndexError, OverflowError) as error:
+                columns, lists = _text(tokens, element)
+        except (ValueError, OverflowError) as error:
             raise GeometryError(
                 f"{path}: element '{element.name}' is cut off or holds what is no number: {error}"
             ) from None
@@ -62,7 +66,7 @@ def read_ply(data: bytes, path: Path, max_faces: int) -> tuple[Array, Ints]:
             if found is None:
                 raise GeometryError(f"{path}: its faces have no list '{_CORNERS[0]}'")
             corners, counts = found
-    rest = body[at:].strip(b"\0 \r\n\t") if order else tokens[at:]
+    rest = body[at:].strip(b"\0 \r\n\t") if order else next(tokens, b"")
     if rest:
         raise GeometryError(f"{path}: more data than its header says")
     return points, triangulated(points, corners, counts, str(path))
@@ -109,36 +113,29 @@ _Columns = dict[str, Array]
 _Lists = dict[str, tuple[Ints, Ints]]  # items one after another, and how many in each row
 
 
-def _text(tokens: list[bytes], at: int, element: _Element) -> tuple[_Columns, _Lists, int]:
+def _text(tokens: Iterator[bytes], element: _Element) -> tuple[_Columns, _Lists]:
     if not any(of_count for *_, of_count in element.properties):
         width = len(element.properties)
-        end = at + width * element.count
-        if end > len(tokens):
-            raise ValueError(f"{end - len(tokens)} values are missing")
-        table = np.array(tokens[at:end], dtype=np.float64).reshape(element.count, width)
-        return {p[0]: table[:, k] for k, p in enumerate(element.properties)}, {}, end
-    lists: dict[str, tuple[list[int], list[int]]] = {
-        name: ([], []) for name, _, of_count in element.properties if of_count
+        values = array("d", map(float, islice(tokens, width * element.count)))
+        if len(values) < width * element.count:
+            raise ValueError(f"{width * element.count - len(values)} values are missing")
+        table = np.array(values).reshape(element.count, width)
+        return {p[0]: table[:, k] for k, p in enumerate(element.properties)}, {}
+    lists = {
+        name: (array("q"), array("q"))
+        for name, kind, of_count in element.properties
+        if of_count and kind[0] != "f"
     }
     for _ in range(element.count):
-        for name, kind, of_count in element.properties:
-            if not of_count:
-                at += 1
-                continue
-            count = int(tokens[at])
-            if count < 0 or at + 1 + count > len(tokens):
-                raise ValueError(f"a list of {count}")
-            if name in _CORNERS or kind[0] != "f":
-                lists[name][0].extend(int(token) for token in tokens[at + 1 : at + 1 + count])
+        for name, _, of_count in element.properties:
+            count = int(next(tokens, b"nothing")) if of_count else 1
+            found = list(islice(tokens, max(count, 0)))
+            if count < 0 or len(found) < count:
+                raise ValueError(f"a list of {count}, of which {len(found)} are there")
+            if name in lists:
+                lists[name][0].extend(map(int, found))
                 lists[name][1].append(count)
-            at += 1 + count
-    if at > len(tokens):
-        raise ValueError(f"{at - len(tokens)} values are missing")
-    return (
-        {},
-        {k: (np.array(v, np.int64), np.array(n, np.int64)) for k, (v, n) in lists.items()},
-        at,
-    )
+    return {}, {k: (np.array(v, np.int64), np.array(n, np.int64)) for k, (v, n) in lists.items()}
 
 
 def _binary(body: bytes, at: int, element: _Element, order: str) -> tuple[_Columns, _Lists, int]:

@@ -1,5 +1,6 @@
 """STL files, binary and text."""
 
+import io
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,8 @@ _BINARY = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribut
 _WORDS = {0: b"facet", 1: b"normal", 5: b"outer", 6: b"loop", 7: b"vertex", 11: b"vertex",
           15: b"vertex", 19: b"endloop", 20: b"endfacet"}  # fmt: skip
 _TOKENS = 21
+_BLOCK = 2000 * _TOKENS  # so many are converted at once
+_LONGEST = 64
 _NUMBERS = [8, 9, 10, 12, 13, 14, 16, 17, 18]
 
 
@@ -44,34 +47,48 @@ def read_stl(data: bytes, path: Path, max_faces: int) -> tuple[Array, Ints]:
 
 
 def _read_text(text: bytes, path: Path, max_faces: int) -> tuple[Array, Ints]:
-    lines, solids = [], 0
-    for line in text.splitlines():
-        head = line.split(maxsplit=1)[:1]
-        kind = head[0].lower() if head else b""
+    blocks: list[Array] = []
+    tokens: list[bytes] = []
+    solids = faces = 0
+    for line in io.BytesIO(text):
+        words = line.split()
+        kind = words[0].lower() if words else b""
         if kind == b"solid":
             solids += 1
         elif kind == b"endsolid":
             solids -= 1
         else:
-            lines.append(line)
+            tokens += words
+        if len(tokens) >= _BLOCK:
+            whole = len(tokens) - len(tokens) % _TOKENS
+            blocks.append(_facets(tokens[:whole], faces, path))
+            faces += whole // _TOKENS
+            tokens = tokens[whole:]
+            if faces > max_faces:
+                raise GeometryError(f"{path}: more than {max_faces} faces")
     if solids:
         raise GeometryError(f"{path}: cut off: a solid without endsolid")
-    tokens = np.array(b" ".join(lines).split())
     if len(tokens) % _TOKENS:
         raise GeometryError(f"{path}: not a whole number of facets with three vertices each")
-    if len(tokens) // _TOKENS > max_faces:
-        raise GeometryError(f"{path}: more than {max_faces} faces")
-    facets = tokens.reshape(-1, _TOKENS)
+    blocks.append(_facets(tokens, faces, path))
+    corners = np.concatenate(blocks)
+    return corners, np.arange(len(corners)).reshape(-1, 3)
+
+
+def _facets(tokens: list[bytes], first: int, path: Path) -> Array:
+    """Corners (n, 3) of facets, of which the first has that number in the file."""
+    if any(len(token) > _LONGEST for token in tokens):
+        raise GeometryError(f"{path}: a word of more than {_LONGEST} letters")
+    facets = np.array(tokens, dtype=f"S{_LONGEST}").reshape(-1, _TOKENS)
     for place, word in _WORDS.items():
         bad = np.char.lower(facets[:, place]) != word
         if bad.any():
             face = int(np.argmax(bad))
             raise GeometryError(
-                f"{path}: facet {face} has '{facets[face, place].decode('latin-1')[:40]}' where "
-                f"'{word.decode()}' is expected"
+                f"{path}: facet {first + face} has '{facets[face, place].decode('latin-1')[:40]}' "
+                f"where '{word.decode()}' is expected"
             )
     try:
-        corners = facets[:, _NUMBERS].astype(np.float64)
+        return facets[:, _NUMBERS].astype(np.float64).reshape(-1, 3)
     except ValueError as error:
         raise GeometryError(f"{path}: a vertex is not three numbers: {error}") from None
-    return corners.reshape(-1, 3), np.arange(3 * len(facets)).reshape(-1, 3)
