@@ -11,7 +11,7 @@ import sys
 
 import atheris
 
-TARGETS = ("urdf", "scenario", "recording", "mesh_file")
+TARGETS = ("urdf", "xacro_file", "scenario", "recording", "mesh_file")
 # Counting which code an input reaches makes everything slower.
 os.environ.setdefault("PROXCGAL_FUZZ_ALLOWANCE", "5")
 
@@ -21,7 +21,7 @@ def main() -> None:
     if len(sys.argv) < 2 or sys.argv[1] not in TARGETS:
         sys.exit(f"drive.py: the first argument is one of {', '.join(TARGETS)}")
     name = sys.argv.pop(1)
-    with atheris.instrument_imports(include=["proxcgal", "mcap", "trimesh", "collada", "tomllib"]):
+    with atheris.instrument_imports(include=["proxcgal", "mcap", "tomllib"]):
         target = importlib.import_module(name)
     atheris.Setup(sys.argv, target.once)
     atheris.Fuzz()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import io
+import json
 import struct
 from pathlib import Path
 
@@ -46,6 +47,17 @@ _MJCF = """<mujoco model="arm"><compiler angle="radian" meshdir="."/>
 <geom type="ellipsoid" size="0.05 0.06 0.07"/><site name="tool"/></body></body></body></worldbody>
 </mujoco>"""
 
+_XACRO = """<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">
+<xacro:arg name="reach" default="0.5"/><xacro:property name="r" value="${$(arg reach) * 0.1}"/>
+<xacro:macro name="link" params="name"><link name="${name}"><visual><geometry>
+<box size="${r} ${r} ${sin(pi / 2)}"/></geometry></visual></link></xacro:macro>
+<xacro:link name="a"/><xacro:link name="b"/><joint name="j" type="revolute"><parent link="a"/>
+<child link="b"/><xacro:if value="${r > 0}"><limit lower="-1" upper="${1 + r}" velocity="1"
+effort="1"/></xacro:if></joint></robot>"""
+
+_LOOP = """<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">
+<xacro:macro name="m"><xacro:m/></xacro:macro><xacro:m/></robot>"""
+
 _CYCLE = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/>
 <joint name="ab" type="fixed"><parent link="a"/><child link="b"/></joint>
 <joint name="bc" type="fixed"><parent link="b"/><child link="c"/></joint>
@@ -75,12 +87,13 @@ def main() -> None:
     """Writes every file again."""
     _write("urdf", {"arm": _URDF, "mjcf": _MJCF, "cycle": _CYCLE, "entities": _ENTITIES,
                     "deep": "<robot>" + "<link>" * 300})  # fmt: skip
+    _write("xacro_file", {"arm": _XACRO, "loop": _LOOP})
     _write("scenario", _scenarios())
     _write("recording", _recordings())
     # The first byte is the format's place among `meshes.SUFFIXES`.
     _write("mesh_file", {"stl": b"\0" + _stl(), "obj": b"\1" + _obj().encode(),
                          "dae": b"\2" + _DAE.encode(), "ply": b"\3" + _ply().encode(),
-                         "off": b"\4" + _off().encode()})  # fmt: skip
+                         "off": b"\4" + _off().encode(), "glb": b"\5" + _glb()})  # fmt: skip
     generator = np.random.default_rng(1)
     _write("tick", {f"random{i}": generator.bytes(300 * (i + 1)) for i in range(6)})
     _write("mesh", {f"random{i}": generator.bytes(150 * (i + 1)) for i in range(6)})
@@ -91,6 +104,24 @@ def _write(target: str, files: dict[str, str] | dict[str, bytes]) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for name, content in files.items():
         (folder / name).write_bytes(content if isinstance(content, bytes) else content.encode())
+
+
+def _glb() -> bytes:
+    points = np.array(_CORNERS, "<f4").tobytes()
+    rows = np.array(_FACES, "<u2").tobytes()
+    content = json.dumps({
+        "asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"},
+                      {"bufferView": 1, "componentType": 5123, "count": 12, "type": "SCALAR"}],
+        "bufferViews": [{"buffer": 0, "byteLength": 48},
+                        {"buffer": 0, "byteOffset": 48, "byteLength": 24}],
+        "buffers": [{"byteLength": 72}],
+    }).encode()  # fmt: skip
+    content += b" " * (-len(content) % 4)
+    body = struct.pack("<I4s", len(content), b"JSON") + content
+    body += struct.pack("<I4s", 72, b"BIN\0") + points + rows
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
 
 
 def _scenarios() -> dict[str, str]:

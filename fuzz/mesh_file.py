@@ -5,8 +5,6 @@ The first byte chooses the format, the rest is the file.
 
 from __future__ import annotations
 
-import collada  # noqa: F401  loaded here: imports are no part of what a call may take
-import trimesh  # noqa: F401
 from bounds import promises
 from places import folder
 

@@ -7,7 +7,9 @@ from pathlib import Path
 import pytest
 
 FUZZ = Path(__file__).parents[1] / "fuzz"
-TARGETS = ("urdf", "scenario", "recording", "mesh_file")
+TARGETS = ("urdf", "xacro_file", "scenario", "recording", "mesh_file")
+# Each of its inputs starts a process.
+SLOW = {"xacro_file": 25}
 
 # In a process of its own: it has folders, warnings and the cache as a fuzzer's run has them.
 _RUN = """
@@ -30,7 +32,7 @@ print(len(inputs))
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_broken_files_raise_errors_of_ours_only(target: str) -> None:
-    count = 400
+    count = SLOW.get(target, 400)
     code = _RUN.format(folder=str(FUZZ), target=target, count=count)
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-4000:]

@@ -19,6 +19,7 @@ from PIL import Image
 import proxcgal as px
 from proxcgal.cli import main
 from proxcgal.cli.replay import ReplayOptions, opens_page
+from proxcgal.core.files import write_json
 from proxcgal.recording.reader import read_recording
 from proxcgal.scenario.loading import load_scenario
 from proxcgal.scenario.setup import Setup
@@ -476,3 +477,21 @@ def test_a_campaigns_folder_is_not_written_over(call: Call, tmp_path: Path) -> N
         assert answer.code == 2
         assert "holds a campaign" in answer.err
     assert [path.name for path in folder.iterdir()] == ["campaign.json"]
+
+
+def test_a_full_disk_names_the_users_file_and_is_no_crash(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def full(_: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    path = tmp_path / "result.json"
+
+    def work() -> int:
+        write_json(path, {"a": 1})
+        return 0
+
+    assert main.guarded(work) == 2
+    assert capsys.readouterr().err == f"proxcgal: {path}: No space left on device\n"
+    assert not list(tmp_path.iterdir())

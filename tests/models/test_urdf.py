@@ -218,7 +218,7 @@ def test_fixed_joints_are_folded_and_branches_kept(tmp_path: Path) -> None:
 def test_several_chains_and_no_tool_ask_for_one(tmp_path: Path) -> None:
     path = tmp_path / "r.urdf"
     path.write_text(robot_of(*ARM, link("c"), joint("k", "a", "c")))
-    with pytest.raises(px.ModelError, match=r"2 chains end, in joints 'j', 'k'; tool= says"):
+    with pytest.raises(px.ModelError, match=r"2 links carry no other: 'b', 'c'; tool= says"):
         px.load_robot(path)
     assert px.load_robot(path, tool="c").tool == "c"
 

@@ -274,3 +274,44 @@ def test_serve_refuses_another_kind_of_scene(capsys: pytest.CaptureFixture[str])
     assert "kind = 'static'; needs 'joint'" in capsys.readouterr().err
     assert main(["serve", "--port", "70000"]) == 2
     assert "must be 0 to 65535" in capsys.readouterr().err
+
+
+def test_a_client_that_sends_no_more_still_gets_its_result(served: Served) -> None:
+    client = served.client()
+    client.send({"op": "goal", "translation": REACHED, "init": "jl"})
+    number = client.read("accepted")["goal"]
+    client.socket.shutdown(socket.SHUT_WR)
+    served.robot.cancel(int(str(number)))
+    assert client.read("result")["goal"] == number
+    assert client.read() == {}
+
+
+def test_a_client_that_says_nothing_is_dropped(
+    served: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tcp_server, "IDLE_S", 0.2)
+    assert served.client().read()["reason"] == "no message for 0.2 s"
+
+
+def test_a_message_that_does_not_end_is_given_up(
+    served: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tcp_server, "LINE_S", 0.2)
+    client = served.client()
+    client.send(b'{"op": "st')
+    assert client.read()["reason"] == "a message takes at most 0.2 s"
+
+
+def test_one_address_begins_two_messages_at_most(served: Served) -> None:
+    slow = [served.client() for _ in range(2)]
+    for client in slow:
+        client.send(b'{"op": ')
+        clock.sleep(0.1)
+    third = served.client()
+    third.send(b'{"op": ')
+    assert third.read()["reason"] == "at most 2 unfinished messages of one address"
+    slow[0].send(b'"state"}\n')  # the others go on
+    assert slow[0].read()["type"] == "state"
+    whole = served.client()
+    whole.send({"op": "state"})
+    assert whole.read()["type"] == "state"

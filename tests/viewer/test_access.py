@@ -133,6 +133,11 @@ def test_with_the_token_the_page_gets_a_cookie_and_that_opens_the_connection(
         {"Origin": "http://evil.example"},
         {"Origin": "null"},
         {"Host": "evil.example"},  # a name that was made to point to this machine
+        {"Origin": "http://[::1"},
+        {"Origin": "http://a]b"},
+        {"Host": "[::1"},
+        {"Host": "127.0.0.1:port"},
+        {"Host": "127.0.0.1:99999999"},
     ],
 )
 def test_pages_of_other_sites_are_refused(open_page: Served, headers: dict[str, str]) -> None:

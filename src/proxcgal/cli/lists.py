@@ -1,4 +1,4 @@
-"""`proxcgal scenarios` and `proxcgal robots`: what there is."""
+"""`proxcgal scenarios`: what there is."""
 
 from dataclasses import dataclass
 
@@ -15,32 +15,16 @@ class ScenariosOptions:
     """
 
 
-@dataclass(frozen=True)
-class RobotsOptions:
-    """The built-in robots, a line each.
-
-    Examples:
-      proxcgal robots
-    """
-
-
 def scenarios_command(options: ScenariosOptions, command: str) -> int:
     """Lists the scenarios."""
     from proxcgal.scenario.loading import list_scenarios
 
-    _columns(list_scenarios())
+    print_columns(list_scenarios())
     return 0
 
 
-def robots_command(options: RobotsOptions, command: str) -> int:
-    """Lists the robots."""
-    from proxcgal.models.builtin import list_robots
-
-    _columns(list_robots())
-    return 0
-
-
-def _columns(listed: dict[str, str]) -> None:
+def print_columns(listed: dict[str, str]) -> None:
+    """Prints names and what is said of each, in two columns."""
     width = max(map(len, listed), default=0)
     for name, description in listed.items():
         print(f"{name.ljust(width)}  {description}".rstrip())

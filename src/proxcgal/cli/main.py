@@ -1,6 +1,7 @@
 """The command `proxcgal`: arguments become a call, problems a line each."""
 
 import difflib
+import errno
 import os
 import shlex
 import sys
@@ -26,7 +27,7 @@ usage: proxcgal COMMAND ...
   replay FILE    step through a recording
   report DIR     write DIR/report.html from the results in DIR
   scenarios      the scenes there are
-  robots         the robots there are
+  robots         the robots there are; robots check FILE: what is understood of one
 
   --help         this text; `proxcgal COMMAND --help` tells a command's options
   --version      versions of proxcgal and of what its results depend on
@@ -53,7 +54,7 @@ COMMANDS = {
     "replay": "proxcgal.cli.replay",
     "report": "proxcgal.cli.report",
     "scenarios": "proxcgal.cli.lists",
-    "robots": "proxcgal.cli.lists",
+    "robots": "proxcgal.cli.robots",
 }
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -65,8 +66,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: without the program's name; None takes the process's own.
 
     Returns:
-        0 done, 1 failed on the way (disk full, the arm met itself), 2 a ProxError (bad
-        input, a simulation that cannot go on), 130 interrupted.
+        0 done, 1 failed on the way (the arm met itself), 2 a ProxError (bad input, a
+        simulation that cannot go on) or a disk that is full, 130 interrupted.
     """
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     if not arguments:
@@ -121,8 +122,11 @@ def guarded(work: Callable[[], int]) -> int:
         return OK
     except OSError as error:
         place = f"{error.filename}: " if error.filename else ""
+        full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+        if full and not place:
+            place = "standard output: "
         _print_problems(f"{place}{error.strerror or error}")
-        return FAILED
+        return BAD_INPUT if full else FAILED
     except KeyboardInterrupt as stop:
         _print_problems("interrupted" + (f"; {stop}" if str(stop) else ""))
         return INTERRUPTED

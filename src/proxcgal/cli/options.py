@@ -41,3 +41,16 @@ def checked_workers(workers: int | None) -> int | None:
     if workers is not None and workers < 1:
         raise ConfigError(f"--workers {workers}: must be 1 or more")
     return workers
+
+
+def xacro_arguments(words: list[str]) -> dict[str, str]:
+    """Arguments of a xacro, by name. Raises: ConfigError: one is no name=value, or comes twice."""
+    found: dict[str, str] = {}
+    for word in words:
+        name, equals, value = word.partition("=")
+        if not equals or not name:
+            raise ConfigError(f"--xacro-arg {word}: name=value is needed")
+        if name in found:
+            raise ConfigError(f"--xacro-arg {name}: given twice")
+        found[name] = value
+    return found

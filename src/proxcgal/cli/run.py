@@ -15,6 +15,7 @@ from proxcgal.cli.options import (
     Settings,
     checked_workers,
     flat,
+    xacro_arguments,
 )
 from proxcgal.core.errors import ConfigError
 
@@ -47,12 +48,17 @@ class RunOptions:
     the sensors' view. Left out: wb sm wb_known; of a scene of kind `joint` wb_known, or wb where
     its perception is sensed."""
     robot: Annotated[str | None, tyro.conf.arg(metavar="NAME|PATH", help_behavior_hint="")] = None
-    """A name that `proxcgal robots` lists, or a .urdf or .xml file, instead of the scenario's."""
+    """A name that `proxcgal robots` lists, or a .urdf, .xacro or .xml file; instead of the
+    scenario's."""
     subject: Number = None
     """Which virtual subject works there, any number from 1: stature, arms, speeds, reactions and
     stance are drawn from it and operator.draw. Of scenarios with an operator."""
     package_dir: Folders = ()
     """Where package:// paths of the robot's file are looked up."""
+    xacro_arg: Settings = ()
+    """Arguments of the robot's file where that is a xacro: name=value"""
+    tool: Annotated[str | None, tyro.conf.arg(metavar="NAME", help_behavior_hint="")] = None
+    """The robot's tool frame, where its file leaves that open."""
     seed: Number = None
     """Fixes every random draw; instead of the scenario's."""
     set: Settings = ()
@@ -132,6 +138,11 @@ def overrides(options: RunOptions) -> list[str]:
         str(path.expanduser().absolute()) for path in flat(options.package_dir, "--package-dir")
     ]:
         changes.append("package_dirs=" + json.dumps(folders))
+    if arguments := flat(options.xacro_arg, "--xacro-arg"):
+        xacro_arguments(arguments)
+        changes.append("xacro_args=" + json.dumps(arguments))
+    if options.tool is not None:
+        changes.append(f"tool={json.dumps(options.tool)}")
     numbers = {"operator.subject": options.subject, "seed": options.seed}
     changes += [f"{key}={number}" for key, number in numbers.items() if number is not None]
     return changes + flat(options.set)

@@ -165,6 +165,13 @@ def inverse(T: Array) -> Array:
     return out
 
 
+def nearest_rotation(R: Array) -> Array:
+    """(3, 3) the rotation nearest to a matrix, by the sum of squares (Kabsch 1976)."""
+    U, _, V = np.linalg.svd(R)
+    near: Array = U @ np.diag([1.0, 1.0, np.linalg.det(U @ V)]) @ V
+    return near
+
+
 def placed(T_WO: Array, points_O: Array) -> Array:
     """(n, 3) points of frame O in W."""
     points_W: Array = points_O @ T_WO[:3, :3].T + T_WO[:3, 3]

@@ -59,6 +59,8 @@ class RobotDescription:
     frames: tuple[Frame, ...]
     tool: str  # name of one of the frames; "" where several chains end and none is called a tool
     source: str  # the file it was read from
+    ends: tuple[str, ...] = ()  # frames of the moving links that carry no other
+    notes: tuple[str, ...] = ()  # what a user of the file is to be warned of
 
     @property
     def link_names(self) -> list[str]:
@@ -78,11 +80,10 @@ class RobotDescription:
             ModelError: which frame is the tool has not been said.
         """
         if not self.tool:
-            ends = sorted(set(range(len(self.joints))) - {joint.parent for joint in self.joints})
             raise ModelError(
-                f"{self.source}: {len(ends)} chains end, in joints "
-                f"{listed(self.joints[end].name for end in ends)}; tool= says which frame is the "
-                f"tool: {listed(frame.name for frame in self.frames)}"
+                f"{self.source}: {len(self.ends)} links carry no other: {listed(self.ends)}; tool= "
+                f"says which frame is the tool: one of these, or of all frames, "
+                f"{listed(frame.name for frame in self.frames)}"
             )
         return self.frame(self.tool)
 

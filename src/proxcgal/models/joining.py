@@ -9,8 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from proxcgal.core.errors import ModelError
+from proxcgal.core.transforms import nearest_rotation
 from proxcgal.core.typing import Array
 from proxcgal.models.description import RobotDescription, listed
+
+#: How far a rotation may be from orthonormal, as the largest entry of R R' - I.
+ROUNDED = 1e-3
 
 
 def joined(
@@ -65,7 +69,10 @@ def joined(
 
 
 def rigid(pose: ArrayLike, what: str) -> Array:
-    """A (4, 4) rigid pose.
+    """A (4, 4) rigid pose: the one nearest to a matrix that was rounded.
+
+    A rotation whose product with its transpose is within ROUNDED of the identity is taken: one made
+    from a quaternion of 4 decimals is within 4e-4.
 
     Raises:
         ModelError: it is none.
@@ -79,9 +86,12 @@ def rigid(pose: ArrayLike, what: str) -> Array:
     if not np.isfinite(T).all():
         raise ModelError(f"{what} holds NaN or infinity; a finite (4, 4) pose is needed")
     R = T[:3, :3]
-    turns = np.abs(R @ R.T - np.eye(3)).max() < 1e-6 and np.linalg.det(R) > 0
-    if not turns or (T[3] != [0, 0, 0, 1]).any():
+    off = float(np.abs(R @ R.T - np.eye(3)).max())
+    if not (off < ROUNDED and np.linalg.det(R) > 0) or (T[3] != [0, 0, 0, 1]).any():
         raise ModelError(f"{what} is {T.tolist()}; a rotation and a translation are needed")
+    if off > 1e-12:
+        T = T.copy()
+        T[:3, :3] = nearest_rotation(R)
     return T
 
 

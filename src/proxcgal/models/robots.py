@@ -5,7 +5,7 @@ import hashlib
 import json
 import os
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -20,6 +20,7 @@ from proxcgal.core.errors import ConfigError, ModelError, ModelWarning
 from proxcgal.core.typing import Array, Ints
 from proxcgal.models.builtin import BUILTIN
 from proxcgal.models.description import RobotDescription, listed
+from proxcgal.models.doubts import doubts
 from proxcgal.models.formats.description_reader import read_description
 from proxcgal.models.formats.paths import ROBOT_SUFFIXES, is_robot_file
 from proxcgal.models.limits import PerJoint, with_limits
@@ -137,6 +138,7 @@ def load_robot(
     tool: str | None = None,
     *,
     base: str | None = None,
+    xacro_args: Mapping[str, str | float | bool] | None = None,
     speed_limits: PerJoint | None = None,
     acceleration_limits: PerJoint | None = None,
     max_deviation: float = 0.002,
@@ -152,35 +154,57 @@ def load_robot(
         package_dirs: folders that hold the packages of package:// paths, or such packages.
         vertices_per_link: of the controller's mesh of each link, met within 10 %; None keeps the
             meshes as they are.
-        tool: name of the tool frame; by default one that is called so, else the last link.
+        tool: name of the tool frame; by default one that is called so, else the only link that
+            carries no other. Where several do, it is asked for.
         base: link whose frame is the world; by default `base_link`, else the first.
+        xacro_args: arguments of a .xacro, by name; text, numbers, True or False.
         speed_limits: [rad/s] or [m/s], one number, one for each joint, or by joint name.
         acceleration_limits: [rad/s^2] or [m/s^2], in the same forms.
         max_deviation: how far the controller's surface may be from the full one [m]. Where that
             takes more vertices, more are kept, with a ModelWarning. Inf keeps to the count.
 
     Raises:
-        ModelError: an unknown name, a file or structure that cannot be read, no speed limit.
+        ModelError: an unknown name, a file or structure that cannot be read, no speed limit, no
+            tool where several links may be it.
         GeometryError: a mesh that cannot be used.
         ConfigError: vertices_per_link or max_deviation out of bounds.
     """
     check_resolution("vertices_per_link", vertices_per_link, max_deviation)
     builtin = BUILTIN.get(str(name_or_path))
-    if builtin is not None:
-        if package_dirs or base:
-            raise ConfigError(
-                f"robot '{name_or_path}' is built in; package_dirs and base are for files"
-            )
-        description = builtin.describe()
-    else:
-        description = read_description(_file(name_or_path), package_dirs, base)
+    description = describe_robot(name_or_path, package_dirs, base=base, xacro_args=xacro_args)
     description = with_limits(
         description, builtin.limits if builtin else None, speed_limits, acceleration_limits
     )
     if tool is not None:
         description = replace(description, tool=description.frame(tool).name)
+    if builtin is None:
+        for note in (*description.notes, *doubts(description)):
+            warnings.warn(f"{description.source}: {note}", ModelWarning, stacklevel=2)
     description.tool_frame  # noqa: B018  raises where it is not known, before the meshes take time
     return Robot(description, control_meshes(description, vertices_per_link, max_deviation))
+
+
+def describe_robot(
+    name_or_path: str | os.PathLike[str],
+    package_dirs: Sequence[str | os.PathLike[str]] = (),
+    *,
+    base: str | None = None,
+    xacro_args: Mapping[str, str | float | bool] | None = None,
+) -> RobotDescription:
+    """What `load_robot` knows of a robot before limits are put in place and meshes made coarser.
+
+    Raises: as `load_robot`.
+    """
+    builtin = BUILTIN.get(str(name_or_path))
+    if builtin is not None:
+        if package_dirs or base or xacro_args:
+            raise ConfigError(
+                f"robot '{name_or_path}' is built in; package_dirs, base and xacro_args are for "
+                "files"
+            )
+        return builtin.describe()
+    path = _file(name_or_path)
+    return read_description(path, package_dirs, base, xacro_args=xacro_args)
 
 
 def control_meshes(

@@ -40,9 +40,13 @@ class Scenario(Section):
     kind: Literal["static", "hri", "joint", "walkthrough", "guided"] = Field(
         description="what kind of scene this is"
     )
-    robot: str = Field(description="a built-in robot's name, or a path to .urdf or .xml")
+    robot: str = Field(description="a built-in robot's name, or a path to .urdf, .xacro or .xml")
     package_dirs: tuple[str, ...] = Field(
         (), description="where package:// paths of the robot's file are looked up"
+    )
+    xacro_args: tuple[str, ...] = Field((), description="name=value, arguments of a .xacro robot")
+    tool: str | None = Field(
+        None, description="name of the robot's tool frame, where its file leaves that open"
     )
     vertices_per_link: int = Field(
         1000, ge=0, description="of the controller's meshes, 0: as they are; the simulator's are"

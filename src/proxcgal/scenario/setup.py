@@ -153,9 +153,22 @@ def make_robot(scenario: Scenario) -> Robot:
         scenario.robot,
         package_dirs=scenario.package_dirs,
         vertices_per_link=scenario.vertices_per_link or None,
+        tool=scenario.tool,
+        xacro_args=_xacro_args(scenario),
         speed_limits=scenario.limits.speed,
         acceleration_limits=scenario.limits.acceleration,
     )
+
+
+def _xacro_args(scenario: Scenario) -> dict[str, str]:
+    """By name. Raises: ConfigError: one is no name=value, or comes twice."""
+    found: dict[str, str] = {}
+    for word in scenario.xacro_args:
+        name, equals, value = word.partition("=")
+        if not equals or not name or name in found:
+            raise ConfigError(f"xacro_args: {word!r}; each name once, as name=value, is needed")
+        found[name] = value
+    return found
 
 
 def make_skin(scenario: Scenario, robot: Robot) -> _core.Skin:

@@ -19,6 +19,9 @@ BURST = 20  # at once
 UNREAD_BYTES = 1 << 18  # that a client may leave unread before it is dropped
 FEEDBACK_S = 0.1  # [s] between two feedbacks
 CLOSE_S = 1.0  # [s] that a client has to read its last message
+IDLE_S = 300.0  # [s] without a message and without a goal, after which a client is dropped
+LINE_S = 10.0  # [s] in which a message that has begun has to be whole
+UNFINISHED = 2  # messages of one address that have begun and are not whole
 
 
 def serve_until_stopped(robot: JointRobotServer, host: str, port: int, *, quiet: bool) -> None:
@@ -55,6 +58,10 @@ async def _serve(robot: JointRobotServer, host: str, port: int, quiet: bool) -> 
             await server.close()
 
 
+class ClientError(Exception):
+    """What a client did that ends its connection."""
+
+
 @dataclass(eq=False)
 class _Client:
     """One connection with its rate, and its goals."""
@@ -63,6 +70,12 @@ class _Client:
     tokens: float = BURST
     refilled: float = 0.0
     goals: set[int] = field(default_factory=set)  # that are still to end
+    buffer: bytes = b""  # of a message that has begun
+
+    @property
+    def address(self) -> str:
+        """Of the other side, without its port."""
+        return str((self.writer.get_extra_info("peername") or ("?",))[0])
 
     def spend(self, now: float) -> bool:
         """Takes one of the messages that it may still send; False: none is left."""
@@ -152,16 +165,62 @@ class TcpServer:
         loop = asyncio.get_running_loop()
         while True:
             try:
-                line = await reader.readline()
-            except ValueError:  # more than the reader keeps
-                client.send(_error(f"a message has at most {LINE_BYTES} bytes"))
+                line = await self._line(client, reader)
+            except ClientError as error:
+                client.send(_error(str(error)))
                 return
-            if not line.endswith(b"\n"):
+            if not line:
+                await self._outlast(client)
                 return
             if not client.spend(loop.time()):
                 client.send(_error(f"at most {RATE:g} messages a second"))
                 return
             client.send(self._answer(client, line))
+
+    async def _line(self, client: _Client, reader: asyncio.StreamReader) -> bytes:
+        """The next message, whole; empty where the client sends no more.
+
+        Raises:
+            ClientError: it is too long or too slow, or its address has begun too many.
+        """
+        loop = asyncio.get_running_loop()
+        latest = loop.time() + (LINE_S if client.buffer else IDLE_S)
+        while b"\n" not in client.buffer:
+            if len(client.buffer) > LINE_BYTES:
+                raise ClientError(f"a message has at most {LINE_BYTES} bytes")
+            try:
+                data = await asyncio.wait_for(reader.read(LINE_BYTES), latest - loop.time())
+            except TimeoutError:
+                if client.buffer:
+                    raise ClientError(f"a message takes at most {LINE_S:g} s") from None
+                if not client.goals:
+                    raise ClientError(f"no message for {IDLE_S:g} s") from None
+                latest = loop.time() + IDLE_S
+                continue
+            if not data:
+                return b""
+            if not client.buffer:
+                latest = loop.time() + LINE_S
+            client.buffer += data
+            self._bound_unfinished(client)
+        line, _, client.buffer = client.buffer.partition(b"\n")
+        if len(line) >= LINE_BYTES:
+            raise ClientError(f"a message has at most {LINE_BYTES} bytes")
+        return line + b"\n"
+
+    def _bound_unfinished(self, client: _Client) -> None:
+        unfinished = sum(
+            bool(other.buffer) and b"\n" not in other.buffer
+            for other in self._clients
+            if other.address == client.address
+        )
+        if unfinished > UNFINISHED and b"\n" not in client.buffer:
+            raise ClientError(f"at most {UNFINISHED} unfinished messages of one address")
+
+    async def _outlast(self, client: _Client) -> None:
+        """Waits for the results of a client that sends no more and may still read."""
+        while client.goals and not client.writer.transport.is_closing():
+            await asyncio.sleep(FEEDBACK_S / 2)
 
     def _answer(self, client: _Client, line: bytes) -> dict[str, Any]:
         """The answer to one message, whatever it is."""

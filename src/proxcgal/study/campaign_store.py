@@ -2,17 +2,19 @@
 
 import contextlib
 import fcntl
+import hashlib
 import json
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
 from proxcgal.core.closing import Closing
 from proxcgal.core.errors import ConfigError
-from proxcgal.core.files import write_json
+from proxcgal.core.files import as_json, write_json
 
+_SUM = "sha256"  # of the rest of a trial's file
 MANIFEST, TRIALS, SUMMARY = "campaign.json", "trials", "summary.json"
 
 Value = str | int | float | bool | None
@@ -53,9 +55,7 @@ class CampaignStore(Closing):
         with contextlib.ExitStack() as opened:
             try:
                 folder.mkdir(parents=True, exist_ok=True)
-                handle = os.open(folder, os.O_RDONLY)
-                opened.callback(os.close, handle)
-                _lock(handle, folder)
+                hold(folder, opened, "campaign")
                 self._open(folder, description)
             except OSError as error:
                 raise ConfigError(
@@ -78,15 +78,70 @@ class CampaignStore(Closing):
 
     def put(self, outcome: Outcome) -> None:
         """Once this returns, the outcome is found again after anything but a broken disk."""
-        write_json(self._trials / f"{outcome.key}.json", asdict(outcome))
+        content = json.loads(as_json(asdict(outcome)))
+        write_json(self._trials / f"{outcome.key}.json", {**content, _SUM: _checksum(content)})
 
     def outcomes(self, keys: Iterable[str]) -> dict[str, Outcome]:
-        """Those of these trials that are there, by key; what cannot be read counts as not there."""
+        """Those of these trials that are there, by key; a file that is cut off counts as not there.
+
+        Raises:
+            ConfigError: a file that is whole and not as `put` wrote it: names it.
+        """
         found = {}
         for key in keys:
-            with contextlib.suppress(OSError, ValueError, TypeError):
-                found[key] = Outcome(**json.loads((self._trials / f"{key}.json").read_bytes()))
+            path = self._trials / f"{key}.json"
+            try:
+                content = json.loads(path.read_bytes())
+            except RecursionError:
+                raise _not_a_trial(path, "is nested too deep") from None
+            except (FileNotFoundError, ValueError):  # half of it
+                continue
+            except OSError as error:
+                raise _not_a_trial(path, f"cannot be read: {error.strerror}") from None
+            found[key] = _outcome(content, key, path)
         return found
+
+
+def _outcome(content: Any, key: str, path: Path) -> Outcome:
+    """What a trial's file holds. Raises: ConfigError: it is not as it was written."""
+    names = {field.name for field in fields(Outcome)}
+    if not isinstance(content, dict) or content.keys() - {_SUM} != names:
+        raise _not_a_trial(path, f"must hold {', '.join(sorted(names))}")
+    if content["key"] != key:
+        raise _not_a_trial(path, f"is of trial {json.dumps(content['key'])[:80]}")
+    error, row, wall_s = content["error"], content["row"], content["wall_s"]
+    if not isinstance(wall_s, int | float) or isinstance(wall_s, bool):
+        raise _not_a_trial(path, f"wall_s is {json.dumps(wall_s)[:80]}; a number is needed")
+    if not (error is None or isinstance(error, str)):
+        raise _not_a_trial(path, f"error is {json.dumps(error)[:80]}; text or null is needed")
+    if not (row is None or isinstance(row, dict)):
+        raise _not_a_trial(path, f"row is {json.dumps(row)[:80]}; an object or null is needed")
+    for name, value in (row or {}).items():
+        if not _is_value(value):
+            raise _not_a_trial(path, f"{name} is {json.dumps(value)[:80]}; text, a number, true, "
+                               "false, null or a list of numbers is needed")  # fmt: skip
+    own = {name: value for name, value in content.items() if name != _SUM}
+    if content.get(_SUM) != _checksum(own):
+        raise _not_a_trial(path, "is not as it was written: its checksum is another")
+    return Outcome(**own)
+
+
+def _is_value(value: Any) -> bool:
+    if isinstance(value, list):
+        return all(
+            item is None or (isinstance(item, int | float) and not isinstance(item, bool))
+            for item in value
+        )
+    return value is None or isinstance(value, str | int | float)
+
+
+def _not_a_trial(path: Path, what: str) -> ConfigError:
+    return ConfigError(f"{path}: {what}; remove the file, and that trial is run again")
+
+
+def _checksum(content: Mapping[str, Any]) -> str:
+    """SHA-256 of JSON values, whatever the order of their keys."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def _read_manifest(folder: Path) -> dict[str, Any] | None:
@@ -100,7 +155,7 @@ def _read_manifest(folder: Path) -> dict[str, Any] | None:
         content = json.loads(path.read_bytes())
     except (FileNotFoundError, NotADirectoryError):
         return None
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise ConfigError(f"{path}: cannot be read: {error}") from None
     if not isinstance(content, dict):
         raise ConfigError(f"{path}: must hold a JSON object")
@@ -130,10 +185,18 @@ def _shown(value: Any) -> str:
     return "not told" if value is None else json.dumps(value)
 
 
-def _lock(handle: int, folder: Path) -> None:
+def hold(folder: Path, opened: contextlib.ExitStack, what: str = "folder") -> None:
+    """Locks a folder for this process alone, until `opened` is closed or the process ends.
+
+    Raises:
+        ConfigError: another run is at work on it.
+        OSError: it cannot be opened.
+    """
+    handle = os.open(folder, os.O_RDONLY)
+    opened.callback(os.close, handle)
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        raise ConfigError(f"--out {folder}: another process is at work on this campaign") from None
+        raise ConfigError(f"--out {folder}: another process is at work on this {what}") from None
     except OSError:
         pass  # a file system without locks

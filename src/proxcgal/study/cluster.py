@@ -1,7 +1,9 @@
 """Workers of a dask.distributed scheduler: another machine's processes, or a hundred machines'."""
 
 import logging
+import socket
 import threading
+from collections.abc import Callable
 from concurrent.futures import Executor
 from importlib import import_module
 from typing import Any
@@ -9,7 +11,11 @@ from typing import Any
 from proxcgal.core.errors import ConfigError
 from proxcgal.core.provenance import versions
 
-CONNECT_S = 10.0  # [s] in which a scheduler has to answer
+CONNECT_S = 4.0  # [s] in which a scheduler has to take a connection
+GREETING_S = 3.0  # [s] in which it sends its first bytes
+ANSWER_S = 6.0  # [s] in which a client has to be ready, whatever the other side sends
+# A scheduler's first 8 bytes are a length; what text begins with, taken as one, is far above this.
+_LONGEST_GREETING = 1 << 26
 
 _alone = threading.Lock()  # MuJoCo's warnings belong to a process: one job at a time in each
 
@@ -42,8 +48,12 @@ class Cluster:
         self.killed: type[Exception] = distributed.KilledWorker
         try:
             # First: a client of an address that is none fails half made, and again when collected.
-            import_module("distributed.comm").resolve_address(address)
-            self._client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
+            plain = import_module("distributed.comm").resolve_address(address)
+            _require_greeting(plain)
+            self._client = _within(
+                ANSWER_S,
+                lambda: distributed.Client(address, timeout=CONNECT_S, set_as_default=False),
+            )
         except (OSError, ValueError) as error:
             raise ConfigError(
                 f"--cluster {address}: no scheduler answers there: {_first_line(error)}; "
@@ -88,6 +98,49 @@ class Cluster:
         ]
         if apart:
             raise ConfigError("\n".join(apart))
+
+
+def _require_greeting(address: str) -> None:
+    """See that a scheduler speaks at a tcp:// address: it sends its handshake unasked.
+
+    distributed waits without end for one that takes a connection and says nothing of the kind.
+
+    Raises:
+        OSError: nobody there, or something else.
+    """
+    scheme, _, place = address.partition("://")
+    if scheme != "tcp":
+        return
+    host, _, port = place.rpartition(":")
+    with socket.create_connection((host.strip("[]"), int(port)), GREETING_S) as connection:
+        connection.settimeout(GREETING_S)
+        try:
+            first = connection.recv(8, socket.MSG_WAITALL)
+        except TimeoutError:
+            raise OSError(f"it says nothing for {GREETING_S:g} s") from None
+    if len(first) < 8 or int.from_bytes(first, "little") > _LONGEST_GREETING:
+        raise OSError("it does not speak dask's protocol")
+
+
+def _within(seconds: float, make: Callable[[], Any]) -> Any:
+    """What `make` makes, within that time. Raises: OSError: it takes longer; as `make` does."""
+    made: list[Any] = []
+    failed: list[BaseException] = []
+
+    def work() -> None:
+        try:
+            made.append(make())
+        except BaseException as error:
+            failed.append(error)
+
+    thread = threading.Thread(target=work, daemon=True)
+    thread.start()
+    thread.join(seconds)
+    if failed:
+        raise failed[0]
+    if not made:
+        raise OSError(f"no answer within {seconds:g} s")
+    return made[0]
 
 
 def work_far(job: Any) -> Any:

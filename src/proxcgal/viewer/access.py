@@ -50,15 +50,14 @@ class AccessControl:
             return self._refuse("a header came twice")
         host = request.headers.get("Host", "")
         # A page of another site, or a name that was made to point here, must not reach us.
-        if (
-            self._loopback_only
-            and (urllib.parse.urlsplit(f"//{host}").hostname or "") not in LOOPBACK
-        ):
+        if (name := _host_name(host)) is None:
+            return self._refuse("its Host header is none")
+        if self._loopback_only and name not in LOOPBACK:
             return self._refuse(
                 f"host {host!r} is not served here: open http://127.0.0.1:{_port(host)}"
             )
         origin = request.headers.get("Origin")
-        if origin is not None and urllib.parse.urlsplit(origin).netloc != host:
+        if origin is not None and _origin_host(origin) != host:
             return self._refuse("pages of other origins may not connect")
         if not self._has_token(request):
             return self._refuse("a token is needed: open the address that `proxcgal` printed")
@@ -114,6 +113,24 @@ class AccessControl:
         headers = Headers({"Content-Type": "text/plain; charset=utf-8", "Connection": "close",
                            "Content-Length": str(len(body))})  # fmt: skip
         return Response(status.value, status.phrase, headers, body)
+
+
+def _host_name(host: str) -> str | None:
+    """The name in a Host header; None where it is malformed."""
+    try:
+        parts = urllib.parse.urlsplit(f"//{host}")
+        parts.port  # noqa: B018  raises where it is no number
+        return parts.hostname or ""
+    except ValueError:
+        return None
+
+
+def _origin_host(origin: str) -> str | None:
+    """Host and port of an Origin header; None where it is malformed."""
+    try:
+        return urllib.parse.urlsplit(origin).netloc
+    except ValueError:
+        return None
 
 
 def _port(host: str) -> int:

@@ -11,14 +11,17 @@ import numpy as np
 from proxcgal.core.cache import Cache, Stored, hash_file
 from proxcgal.core.errors import ModelError, ProxError
 from proxcgal.models.description import Frame, Joint, Link, RobotDescription
-from proxcgal.models.formats import mjcf, urdf
+from proxcgal.models.formats import urdf
 from proxcgal.models.formats.capsule_robot import read_capsule_robot
+from proxcgal.models.formats.parts import WORLD, assembled
 from proxcgal.models.formats.paths import ROBOT_SUFFIXES, MeshFolders, is_robot_file
-from proxcgal.models.formats.pinocchio_model import WORLD, describe
+from proxcgal.models.formats.pinocchio_model import joints_and_frames
 from proxcgal.models.formats.safe_xml import parse_xml
+from proxcgal.models.formats.xacro_expansion import checked_arguments, expand, still_holds
+from proxcgal.models.mjcf.reader import read_mjcf
 
 # Bump when what is read from the same files changes.
-_VERSION = 1
+_VERSION = 2
 _LIMITS = ("q_min", "q_max", "qd_max", "qdd_max")
 
 
@@ -27,6 +30,7 @@ def read_description(
     package_dirs: Sequence[str | os.PathLike[str]] = (),
     base: str | None = None,
     packages: Mapping[str, Path] | None = None,
+    xacro_args: Mapping[str, str | float | bool] | None = None,
 ) -> RobotDescription:
     """Read a robot description with its meshes at full resolution.
 
@@ -37,6 +41,7 @@ def read_description(
         base: link whose frame is the world. By default `base_link` where no joint moves it, else
             the first link of a URDF, the world of an MJCF.
         packages: folder of some packages, by name.
+        xacro_args: arguments of a xacro, by name.
 
     Raises:
         ModelError: what cannot be read, with the file and the links or joints concerned.
@@ -45,24 +50,44 @@ def read_description(
     path = Path(os.path.normpath(Path(path).absolute()))
     if not is_robot_file(path):
         raise ModelError(f"{path}: {', '.join(ROBOT_SUFFIXES)} are read, not '{path.suffix}'")
+    arguments = checked_arguments(xacro_args)
+    if arguments and path.suffix.lower() != ".xacro":
+        raise ModelError(f"{path}: xacro_args are for .xacro files")
     if path.suffix.lower() == ".toml":
         return read_capsule_robot(path).description(str(path))
     folders = MeshFolders(path, package_dirs, packages)
     cache = Cache("description")
     key = [_VERSION, str(path), base, sorted((k, str(v)) for k, v in folders.packages.items()),
-           *(str(folder) for folder in folders.package_dirs)]  # fmt: skip
+           arguments, *(str(folder) for folder in folders.package_dirs)]  # fmt: skip
     if (stored := cache.get(key)) is not None and (found := description_from(stored)):
         return found
-    root = parse_xml(path, {"robot", "mujoco"})
-    read = _read_mjcf if root.tag == "mujoco" else _read_urdf
     try:
-        description, files = read(root, path, folders, base)
+        description, files, context = _read(path, folders, base, arguments)
     except ProxError:
         raise
-    except (ValueError, RuntimeError) as error:  # of pinocchio
-        raise ModelError(f"{path}: {error}") from None
-    cache.put(key, description_to(description, [path, *files]))
+    except (ValueError, RuntimeError, ArithmeticError, np.linalg.LinAlgError) as error:
+        raise ModelError(f"{path}: {error}") from None  # of pinocchio, or of numbers out of range
+    cache.put(key, description_to(description, [path, *files], context))
     return description
+
+
+_Read = tuple[RobotDescription, list[Path], dict[str, Any]]
+
+
+def _read(path: Path, folders: MeshFolders, base: str | None, arguments: dict[str, str]) -> _Read:
+    if path.suffix.lower() == ".xacro":
+        made = expand(path, folders, arguments)
+        root, files, context = made.root, made.files, made.context
+        if root.tag not in ("robot", "mujoco"):
+            raise ModelError(f"{path}: it makes a <{root.tag}>; expected <mujoco> or <robot>")
+        if root.tag == "mujoco":
+            raise ModelError(f"{path}: it makes an MJCF; of a xacro, URDF is read")
+    else:
+        root, files, context = parse_xml(path, {"robot", "mujoco"}), [], {}
+    if root.tag == "mujoco":
+        return (*_read_mjcf(root, path, folders, base), context)
+    description, meshes = _read_urdf(root, path, folders, base)
+    return description, [*files, *meshes], context
 
 
 def _read_urdf(
@@ -70,73 +95,49 @@ def _read_urdf(
 ) -> tuple[RobotDescription, list[Path]]:
     import pinocchio as pin  # here, because a warm cache does without it
 
-    files: list[Path] = []
-    if path.suffix.lower() == ".xacro":
-        root, files = _expand(path, folders)
     urdf.check_structure(root, path)
-    shapes = urdf.shapes(root, folders)
+    shapes, notes = urdf.shapes(root, folders)
     model = pin.buildModelFromXML(urdf.kinematics_only(root))
-    children = {end.get("link") for end in root.findall("joint/child")}
-    first = next(e.get("name", "") for e in root.findall("link") if e.get("name") not in children)
-    files += [part.file for parts in shapes.values() for part in parts if part.file]
-    description = describe(
-        model,
+    joints, frames = joints_and_frames(model, urdf.speed_limits(root), path)
+    first, ends = urdf.ends(root)
+    description = assembled(
         shapes,
+        joints,
+        frames,
+        ends=ends,
         name=root.get("name") or path.stem,
         source=path,
-        base=base or _default_base(model, first),
-        limits={},
-        speeds=urdf.speed_limits(root),
+        base=base or _default_base(frames, first),
+        notes=notes,
     )
-    return description, files
+    return description, [part.file for parts in shapes.values() for part in parts if part.file]
 
 
 def _read_mjcf(
     root: ET.Element, path: Path, folders: MeshFolders, base: str | None
 ) -> tuple[RobotDescription, list[Path]]:
-    import pinocchio as pin  # here, because a warm cache does without it
-
-    files = mjcf.check_structure(root, path, folders)
-    model = pin.buildModelFromMJCF(str(path))
-    description = describe(
-        model,
-        mjcf.shapes(model, path, root),
-        name=root.get("model") or path.stem,
+    found = read_mjcf(root, path, folders)
+    description = assembled(
+        found.shapes,
+        found.joints,
+        found.frames,
+        ends=found.ends,
+        name=found.name,
         source=path,
-        base=base or _default_base(model, WORLD),
-        limits=mjcf.position_limits(root, model),
-        speeds={},
+        base=base or _default_base(found.frames, WORLD),
+        notes=found.notes,
     )
-    return description, files
+    return description, found.files
 
 
-def _default_base(model: Any, otherwise: str) -> str:
-    fixed = any(f.name == "base_link" and f.parentJoint == 0 for f in model.frames)
+def _default_base(frames: Sequence[Frame], otherwise: str) -> str:
+    fixed = any(frame.name == "base_link" and frame.joint < 0 for frame in frames)
     return "base_link" if fixed else otherwise
 
 
-def _expand(path: Path, folders: MeshFolders) -> tuple[ET.Element, list[Path]]:
-    """The URDF that a xacro makes, and the files it was made from.
-
-    A xacro is a program: it can read files that it names. Only those that one trusts are for use.
-    """
-    import xacro  # type: ignore[import-untyped]  # here, for those files only
-    from xacrodoc import XacroDoc, packages
-
-    known = {folder.name: folder for folder in folders.package_dirs}
-    for folder in folders.package_dirs:
-        known |= {inner.name: inner for inner in folder.iterdir() if inner.is_dir()}
-    known |= folders.packages
-    try:
-        packages.update_package_cache({name: str(where) for name, where in known.items()})
-        text = XacroDoc.from_file(str(path), resolve_packages=False).to_urdf_string()
-        files = [Path(file) for file in xacro.all_includes]
-    except Exception as error:  # xacro raises what the expressions in it raise
-        raise ModelError(f"{path}: xacro: {error}") from None
-    return ET.fromstring(text), files
-
-
-def description_to(description: RobotDescription, files: Iterable[Path]) -> Stored:
+def description_to(
+    description: RobotDescription, files: Iterable[Path], context: Mapping[str, Any] | None = None
+) -> Stored:
     """The entry that `description_from` reads; valid while the files stay as they are."""
     joints, links, frames = description.joints, description.links, description.frames
     arrays = {
@@ -152,6 +153,9 @@ def description_to(description: RobotDescription, files: Iterable[Path]) -> Stor
         "files": {str(file): hash_file(file) for file in set(files)},
         "name": description.name,
         "tool": description.tool,
+        "ends": description.ends,
+        "notes": description.notes,
+        "context": dict(context or {}),
         "source": description.source,
         "joints": [[j.name, j.type, j.parent] for j in joints],
         "links": [[link.name, link.joint, link.dropped_faces] for link in links],
@@ -165,6 +169,8 @@ def description_from(entry: Stored) -> RobotDescription | None:
     arrays, meta = entry.arrays, entry.meta
     try:
         if any(hash_file(Path(file)) != known for file, known in meta["files"].items()):
+            return None
+        if not still_holds(meta["context"]):
             return None
         joints = tuple(
             Joint(
@@ -198,6 +204,8 @@ def description_from(entry: Stored) -> RobotDescription | None:
             links=links,
             frames=frames,
             tool=meta["tool"],
+            ends=tuple(meta["ends"]),
+            notes=tuple(meta["notes"]),
             source=meta["source"],
         )
     except (OSError, KeyError, IndexError, TypeError, ValueError):

@@ -43,13 +43,14 @@ class MeshFolders:
             if not folder.is_dir():
                 raise ModelError(f"package folder {folder}: no such folder")
 
-    def find(self, name: str, what: str, base: Path | None = None) -> Path:
+    def find(self, name: str, what: str, base: Path | None = None, kind: str = "mesh file") -> Path:
         """The file that `name` means.
 
         Args:
             name: package://, file:// or a path relative to `base`.
             what: the link or mesh concerned, for messages.
             base: folder of relative paths; that of the description when not given.
+            kind: of file, for messages.
 
         Raises:
             ModelError: no such file, or it lies outside of the folders.
@@ -65,13 +66,33 @@ class MeshFolders:
             )
         else:
             path = (base or self.own[0]) / name
-        path = Path(os.path.normpath(path))
-        folders = [*self.own, *self.package_dirs, *self.packages.values()]
-        if not any(path.is_relative_to(folder) for folder in folders):
-            self._outside(name, what, path, folders)
+        path = self.check(path, name, what)
         if not path.is_file():
-            raise ModelError(f"{self.description}: no mesh file '{name}' of {what} at {path}")
+            raise ModelError(f"{self.description}: no {kind} '{name}' of {what} at {path}")
         return path
+
+    def check(self, path: Path, name: str, what: str) -> Path:
+        """The path, `..` resolved.
+
+        Raises:
+            ModelError: it lies outside of the folders.
+        """
+        path = Path(os.path.normpath(path))
+        if not self._within(path):
+            self._outside(name, what, path, self._all)
+        return path
+
+    def holds(self, path: Path) -> bool:
+        """Whether that is a file within the folders."""
+        path = Path(os.path.normpath(path))
+        return self._within(path) and path.is_file()
+
+    @property
+    def _all(self) -> list[Path]:
+        return [*self.own, *self.package_dirs, *self.packages.values()]
+
+    def _within(self, path: Path) -> bool:
+        return any(path.is_relative_to(folder) for folder in self._all)
 
     def _in_package(self, name: str, what: str) -> Path:
         package, _, rest = name.split("://", 1)[1].partition("/")
@@ -96,6 +117,6 @@ class MeshFolders:
     def _outside(self, name: str, what: str, path: Path, folders: Sequence[Path]) -> None:
         allowed = ", ".join(str(folder) for folder in folders)
         raise ModelError(
-            f"{self.description}: {what} has its mesh at '{name}', which is {path}: outside of "
+            f"{self.description}: {what} names '{name}', which is {path}: outside of "
             f"{allowed}. package_dirs allows more folders"
         )

@@ -22,12 +22,13 @@ _CHUNK = 2**16
 _NO_DIRECTION = 1e-9
 
 
-def parse_xml(path: Path, roots: Collection[str]) -> ET.Element:
+def parse_xml(path: Path, roots: Collection[str], bare_names: bool = False) -> ET.Element:
     """Read an XML file as a tree.
 
     Args:
         path: the file.
         roots: what the outermost tag may be; empty for any.
+        bare_names: take the prefix of a name space off every tag.
 
     Raises:
         ModelError: it cannot be read, is not well-formed, declares a document type or an entity,
@@ -42,6 +43,8 @@ def parse_xml(path: Path, roots: Collection[str]) -> ET.Element:
 
     def start(tag: str, attributes: dict[str, str]) -> None:
         nonlocal depth, count
+        if bare_names:
+            tag = tag.rpartition(":")[2]
         depth += 1
         count += 1
         if depth > MAX_DEPTH:
@@ -55,7 +58,7 @@ def parse_xml(path: Path, roots: Collection[str]) -> ET.Element:
     def end(tag: str) -> None:
         nonlocal depth
         depth -= 1
-        builder.end(tag)
+        builder.end(tag.rpartition(":")[2] if bare_names else tag)
 
     def doctype(*_: object) -> None:
         refuse("a document type declaration, which can define entities; none is allowed")

@@ -14,10 +14,10 @@ import numpy as np
 
 from proxcgal.core.errors import GeometryError, ModelError
 from proxcgal.core.transforms import pose
-from proxcgal.core.typing import Array, Ints
+from proxcgal.core.typing import Array
 from proxcgal.models.description import listed
+from proxcgal.models.formats.parts import Shape
 from proxcgal.models.formats.paths import MeshFolders
-from proxcgal.models.formats.pinocchio_model import Shape
 from proxcgal.models.formats.safe_xml import is_direction, parse_number, parse_numbers
 from proxcgal.models.mesh.shapes import box, cylinder, ellipsoid
 
@@ -123,8 +123,10 @@ def _check_joint(element: ET.Element, name: str, path: Path) -> None:
         parse_number(limit.get(key, "0"), f"{what}, limit {key}", math.inf)
         for key in ("lower", "upper", "velocity")
     )
-    if kind != "continuous" and not lower < upper:
-        raise ModelError(f"{what} has lower limit {lower} and upper limit {upper}; lower < upper")
+    if kind != "continuous" and not lower <= upper:
+        raise ModelError(f"{what} has lower limit {lower} and upper limit {upper}; lower <= upper")
+    if kind != "continuous" and lower == upper and not math.isfinite(lower):
+        raise ModelError(f"{what} is locked at {lower}; a finite number is needed")
 
 
 def kinematics_only(root: ET.Element) -> str:
@@ -158,21 +160,43 @@ def speed_limits(root: ET.Element) -> dict[str, float]:
     return found
 
 
-def shapes(root: ET.Element, folders: MeshFolders) -> dict[str, list[Shape]]:
+def ends(root: ET.Element) -> tuple[str, list[str]]:
+    """The link that no joint carries, and the links that carry no other."""
+    carried, carrying = (
+        {end.get("link") for end in root.findall(f"joint/{tag}")} for tag in ("child", "parent")
+    )
+    names = [element.get("name", "") for element in root.findall("link")]
+    return (
+        next(name for name in names if name not in carried),
+        [name for name in names if name not in carrying],
+    )
+
+
+def shapes(root: ET.Element, folders: MeshFolders) -> tuple[dict[str, list[Shape]], list[str]]:
     """What each link looks like: its visuals, or its collision shapes where it has no visual.
+
+    Placeholders, shapes with a size of 0, are left out, with a note.
 
     Raises:
         ModelError: a mesh file that is missing or outside of its folders, a shape that is not read.
     """
     found = {}
+    empty: dict[str, None] = {}
     for link in root.findall("link"):
         name = link.get("name", "")
         for tag in ("visual", "collision"):
-            parts = [part for e in link.findall(tag) if (part := _shape(e, name, folders))]
-            if parts:
+            made = [_shape(e, name, folders) for e in link.findall(tag)]
+            if any(part is _PLACEHOLDER for part in made):
+                empty[name] = None
+            if parts := [part for part in made if part and part is not _PLACEHOLDER]:
                 found[name] = parts
                 break
-    return found
+    notes = [f"link {listed(empty)}: a shape of size 0 is left out"] if empty else []
+    return found, notes
+
+
+# A shape that stands where there is none.
+_PLACEHOLDER = Shape(np.eye(4))
 
 
 def _shape(element: ET.Element, link: str, folders: MeshFolders) -> Shape | None:
@@ -185,31 +209,36 @@ def _shape(element: ET.Element, link: str, folders: MeshFolders) -> Shape | None
     T_LS = _origin(element, where)
     if kind.tag == "mesh":
         scale = parse_numbers(kind.get("scale", "1 1 1"), 3, f"{where}, mesh scale")
+        if (scale == 0).all():
+            return _PLACEHOLDER
         if (scale == 0).any():
             raise ModelError(f"{where} has mesh scale {scale.tolist()}; 0 leaves no surface")
         return Shape(T_LS, file=folders.find(kind.get("filename", ""), what), scale=scale)
-    made: tuple[Array, Ints]
-    if kind.tag == "box":
-        made = box(_positive(parse_numbers(kind.get("size", ""), 3, f"{where}, box size"), where))
-    elif kind.tag == "cylinder":
-        sizes = [parse_number(kind.get(key, ""), f"{where}, cylinder {key}") for key in
-                 ("radius", "length")]  # fmt: skip
-        radius, length = _positive(np.array(sizes), where)
-        made = cylinder(radius, length)
-    elif kind.tag == "sphere":
-        radius = parse_number(kind.get("radius", ""), f"{where}, sphere radius")
-        made = ellipsoid(_positive(np.full(3, radius), where))
-    else:
-        raise ModelError(f"{where} has shape <{kind.tag}>; mesh, box, cylinder, sphere are read")
-    return Shape(T_LS, mesh=made)
-
-
-def _positive(sizes: Array, where: str) -> Array:
-    if not (sizes > 0).all():
+    sizes = _sizes(kind, where)
+    if (sizes < 0).any():
         raise GeometryError(
             f"{where} has a shape with size {sizes.tolist()}; more than 0 is needed"
         )
-    return sizes
+    if (sizes == 0).any():
+        return _PLACEHOLDER
+    if kind.tag == "box":
+        return Shape(T_LS, mesh=box(sizes))
+    if kind.tag == "cylinder":
+        return Shape(T_LS, mesh=cylinder(*sizes))
+    return Shape(T_LS, mesh=ellipsoid(np.repeat(sizes, 3)))
+
+
+_SIZES = {"cylinder": ("radius", "length"), "sphere": ("radius",)}
+
+
+def _sizes(kind: ET.Element, where: str) -> Array:
+    """Size of a box (3,), radius and length of a cylinder (2,), radius of a sphere (1,) [m]."""
+    if kind.tag == "box":
+        return parse_numbers(kind.get("size", ""), 3, f"{where}, box size")
+    if kind.tag in _SIZES:
+        return np.array([parse_number(kind.get(key, ""), f"{where}, {kind.tag} {key}")
+                         for key in _SIZES[kind.tag]])  # fmt: skip
+    raise ModelError(f"{where} has shape <{kind.tag}>; mesh, box, cylinder, sphere are read")
 
 
 def _origin(element: ET.Element, what: str) -> Array:

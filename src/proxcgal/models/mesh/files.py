@@ -1,6 +1,5 @@
 """Mesh files as clean triangles: welded, finite, without empty faces."""
 
-import io
 import os
 from pathlib import Path
 
@@ -8,12 +7,22 @@ import numpy as np
 
 from proxcgal.core.errors import GeometryError
 from proxcgal.core.typing import Array, Ints
-from proxcgal.models.formats.safe_xml import FARTHEST, parse_xml
+from proxcgal.models.formats.safe_xml import FARTHEST
+from proxcgal.models.mesh.collada_file import read_dae
+from proxcgal.models.mesh.glb_file import read_glb
+from proxcgal.models.mesh.obj_file import read_obj
+from proxcgal.models.mesh.off_file import read_off
+from proxcgal.models.mesh.ply_file import read_ply
+from proxcgal.models.mesh.stl_file import read_stl
 from proxcgal.models.mesh.triangles import compact, double_areas
 
 MAX_FACES = 5_000_000
-MAX_MESH_BYTES = 512 * 2**20
-MESH_SUFFIXES = (".stl", ".obj", ".dae", ".ply", ".off")
+MAX_MESH_BYTES = 256 * 2**20  # 5 million faces of a binary STL
+MAX_TEXT_BYTES = 32 * 2**20  # text takes ten times its size in memory, and 0.3 s a MiB
+_READERS = {".stl": read_stl, ".obj": read_obj, ".ply": read_ply, ".off": read_off,
+            ".glb": read_glb}  # fmt: skip
+_MAYBE_BINARY = (".stl", ".ply", ".glb")
+MESH_SUFFIXES = (".stl", ".obj", ".dae", ".ply", ".off", ".glb")
 # Vertices closer than this are one [m].
 _WELD = 1e-7
 # A face whose doubled area is below this share of its longest side squared has none.
@@ -24,7 +33,8 @@ def load_mesh(path: str | os.PathLike[str]) -> tuple[Array, Ints]:
     """Triangles of a mesh file, as they are in it.
 
     Args:
-        path: STL, OBJ, DAE (its length unit is applied), PLY or OFF.
+        path: STL, OBJ, DAE (its length unit is applied), PLY, OFF or GLB; at most MAX_FACES faces,
+            MAX_MESH_BYTES bytes, MAX_TEXT_BYTES where it is text.
 
     Returns:
         vertices (v, 3) [m] and triangles (f, 3).
@@ -40,11 +50,19 @@ def load_mesh(path: str | os.PathLike[str]) -> tuple[Array, Ints]:
     try:
         if (size := path.stat().st_size) > MAX_MESH_BYTES:
             raise GeometryError(f"{path}: {size} bytes; at most {MAX_MESH_BYTES} are read")
-        data = path.read_bytes()
+        data = path.read_bytes() if suffix != ".dae" else b""
     except OSError as error:
         raise GeometryError(f"{path}: cannot be read: {error.strerror}") from None
-    read = _read_obj if suffix == ".obj" else _read_with_trimesh
-    vertices, triangles = read(data, path)
+    is_text = suffix not in _MAYBE_BINARY or b"\0" not in data
+    if suffix != ".dae" and is_text and size > MAX_TEXT_BYTES:
+        raise GeometryError(
+            f"{path}: {size} bytes of text; at most {MAX_TEXT_BYTES} are read: save it as "
+            "binary STL"
+        )
+    if suffix == ".dae":
+        vertices, triangles = read_dae(path, MAX_FACES)
+    else:
+        vertices, triangles = _READERS[suffix](data, path, MAX_FACES)
     check_mesh(vertices, triangles, str(path))
     return vertices, triangles
 
@@ -104,74 +122,3 @@ def clean_mesh(vertices: Array, triangles: Ints, what: str) -> tuple[Array, Ints
         raise GeometryError(f"{what}: none of its {len(triangles)} faces has an area")
     vertices, welded = compact(vertices, welded[good])
     return np.ascontiguousarray(vertices, dtype=np.float64), welded, int(np.sum(~good))
-
-
-def _read_obj(data: bytes, path: Path) -> tuple[Array, Ints]:
-    """Vertices and faces of an OBJ; what else it holds (materials, normals) is for pictures.
-
-    trimesh takes index 0 for the last vertex and drops what it cannot place, so it is not used.
-    """
-    vertices: list[list[bytes]] = []
-    faces: list[tuple[int, int, int]] = []
-    for number, line in enumerate(data.splitlines(), start=1):
-        if line.startswith(b"v "):
-            vertices.append(line.split()[1:4])
-        elif line.startswith(b"f "):
-            try:
-                corners = [int(token.split(b"/", 1)[0]) for token in line.split()[1:]]
-            except ValueError:
-                raise GeometryError(f"{path}, line {number}: not a face") from None
-            # From 1, or backwards from the latest vertex.
-            rows = [c - 1 if c > 0 else len(vertices) + c if c else -1 for c in corners]
-            if len(rows) < 3:
-                raise GeometryError(
-                    f"{path}, line {number}: a face with {len(rows)} corners; 3 are needed"
-                )
-            if outside := [c for c, row in zip(corners, rows, strict=True)
-                           if not 0 <= row < MAX_MESH_BYTES]:  # fmt: skip
-                raise GeometryError(
-                    f"{path}, line {number}: face {len(faces)} has vertex {outside[0]}; "
-                    f"{len(vertices)} are known there"
-                )
-            faces += [(rows[0], rows[k], rows[k + 1]) for k in range(1, len(rows) - 1)]
-            if len(faces) > MAX_FACES:
-                raise GeometryError(f"{path}: more than {MAX_FACES} faces")
-    try:
-        points = np.array(vertices, dtype=np.float64).reshape(-1, 3)
-    except ValueError:
-        raise GeometryError(f"{path}: a vertex is not three numbers") from None
-    return points, np.array(faces, dtype=np.int64).reshape(-1, 3)
-
-
-def _read_with_trimesh(data: bytes, path: Path) -> tuple[Array, Ints]:
-    suffix = path.suffix.lower()
-    if suffix == ".stl" and data[:5].lower() != b"solid":
-        count = int.from_bytes(data[80:84], "little")
-        if count > MAX_FACES:
-            raise GeometryError(f"{path}: {count} faces; at most {MAX_FACES} are taken")
-        if len(data) < 84 + 50 * count:
-            raise GeometryError(f"{path}: cut off: {count} faces take {84 + 50 * count} bytes, "
-                                f"{len(data)} are there")  # fmt: skip
-    unit = 1.0
-    if suffix == ".dae":
-        # In metres per unit, which trimesh notes and does not apply. The up axis is left alone, as
-        # ROS and pinocchio do.
-        try:
-            asset = parse_xml(path, {"COLLADA"}).find("asset/unit")
-            unit = float(asset.get("meter", "1")) if asset is not None else 1.0
-        except ValueError as error:
-            raise GeometryError(str(error)) from None
-        if not 0 < unit <= FARTHEST:
-            raise GeometryError(f"{path}: its unit is {unit} m; more than 0 is needed, at most "
-                                f"{FARTHEST:g}")  # fmt: skip
-    import trimesh  # here, because a warm cache does without it
-
-    try:
-        # From memory: there is no folder from which it could read anything else.
-        scene = trimesh.load_scene(io.BytesIO(data), file_type=suffix[1:], process=False)
-        mesh = scene.to_mesh()
-    except Exception as error:  # whatever a broken file makes the readers raise
-        raise GeometryError(f"{path}: cannot be read as a mesh: {error!r}") from None
-    vertices = np.asarray(mesh.vertices, dtype=np.float64).reshape(-1, 3)
-    with np.errstate(over="ignore"):  # what overflows is refused as not finite
-        return vertices * unit, np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)

@@ -59,35 +59,36 @@ def run_joint(
     for start in starts:
         check_setup(start, controllers, quiet=quiet)
         part(robot_of(start), start.controller.macro_joints, "macro")  # its table has both arms
-    ready_folders([folder])
-    jobs = [(start, name) for start in starts for name in controllers]
-    for start, name in jobs:
-        _recording(folder, start, name).unlink(missing_ok=True)
-    rows = _runs(jobs, folder, workers, quiet)
-    # What a campaign's table has beside these are strings for its figures.
-    runs = [{key: value for key, value in row.items() if key != "series"} for row in rows]
-    own = [row["self_min_m"] for row in rows]
-    summary: Summary = {
-        "scenario": scenario.name, "robot": rows[0]["robot"], "seed": scenario.seed, "runs": runs,
-        "self_min_m": min(own), "self_under_limit": sum(value < SELF_LIMIT_M for value in own),
-        "failed": min(own) < SELF_LIMIT_M,
-    }  # fmt: skip
-    write_text(folder / "scenario.toml", scenario.to_toml())
-    write_json(folder / "run.json", {**origin(command), "description": scenario.description})
-    shown = [{**row, "stack": "full"} for row in rows]  # whatever the stack is
-    write_bytes(folder / FIGURE, png(joint_figure(scenario.name, shown)))
-    write_json(folder / "summary.json", summary)
-    for listing in listings(summary):
-        if listing.rows:
-            print(f"{listing}\n")
-    for sentence in verdicts(summary):
-        print(sentence)
-    if summary["failed"]:
-        print(
-            f"proxcgal: {scenario.name}: failed: the robot came within {min(own):.3f} m of itself, "
-            f"allowed is {SELF_LIMIT_M} m", file=sys.stderr,
-        )  # fmt: skip
-    return bool(summary["failed"])
+    with ready_folders([folder]):
+        jobs = [(start, name) for start in starts for name in controllers]
+        for start, name in jobs:
+            _recording(folder, start, name).unlink(missing_ok=True)
+        rows = _runs(jobs, folder, workers, quiet)
+        # What a campaign's table has beside these are strings for its figures.
+        runs = [{key: value for key, value in row.items() if key != "series"} for row in rows]
+        own = [row["self_min_m"] for row in rows]
+        summary: Summary = {
+            "scenario": scenario.name, "robot": rows[0]["robot"], "seed": scenario.seed,
+            "runs": runs,
+            "self_min_m": min(own), "self_under_limit": sum(value < SELF_LIMIT_M for value in own),
+            "failed": min(own) < SELF_LIMIT_M,
+        }  # fmt: skip
+        write_text(folder / "scenario.toml", scenario.to_toml())
+        write_json(folder / "run.json", {**origin(command), "description": scenario.description})
+        shown = [{**row, "stack": "full"} for row in rows]  # whatever the stack is
+        write_bytes(folder / FIGURE, png(joint_figure(scenario.name, shown)))
+        write_json(folder / "summary.json", summary)
+        for listing in listings(summary):
+            if listing.rows:
+                print(f"{listing}\n")
+        for sentence in verdicts(summary):
+            print(sentence)
+        if summary["failed"]:
+            print(
+                f"proxcgal: {scenario.name}: failed: the robot came within {min(own):.3f} m of "
+                f"itself, allowed is {SELF_LIMIT_M} m", file=sys.stderr,
+            )  # fmt: skip
+        return bool(summary["failed"])
 
 
 def _recording(folder: Path, start: JointScenario, controller: str) -> Path:

@@ -5,7 +5,7 @@ Nothing is written where something does not fit.
 
 import contextlib
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from proxcgal.core.errors import ConfigError
@@ -14,7 +14,7 @@ from proxcgal.models.robots import Robot
 from proxcgal.scenario.scenario import CONTROLLERS, Scenario
 from proxcgal.scenario.setup import Setup
 from proxcgal.scenario.walkthrough_scenario import WalkScenario
-from proxcgal.study.campaign_store import MANIFEST
+from proxcgal.study.campaign_store import MANIFEST, hold
 from proxcgal.trial.trial import assemble
 from proxcgal.trial.walkthrough.setup import WalkSetup
 
@@ -63,16 +63,27 @@ def check_setup(
         )
 
 
-def ready_folders(folders: Sequence[Path]) -> list[Path]:
+@contextlib.contextmanager
+def ready_folders(folders: Sequence[Path]) -> Iterator[None]:
     """Makes the folders, shows that they can be written, removes an earlier run's files.
 
-    Returns:
-        The folders that were not there before, innermost last.
+    They are this run's alone for the time of the context. At its end those that were not there
+    before, and that nothing was written to, are removed.
 
     Raises:
-        ConfigError: a folder cannot be made or written, or holds a campaign; none is left behind
-            that was not there.
+        ConfigError: a folder cannot be made or written, holds a campaign, or another run is at work
+            on it; none is left behind that was not there.
     """
+    with contextlib.ExitStack() as held:
+        made = _made_ready(folders, held)
+        try:
+            yield
+        finally:
+            _remove_empty(made)
+
+
+def _made_ready(folders: Sequence[Path], held: contextlib.ExitStack) -> list[Path]:
+    """The folders that were not there before, innermost last."""
     for folder in folders:
         if (folder / MANIFEST).exists():
             raise ConfigError(
@@ -85,10 +96,14 @@ def ready_folders(folders: Sequence[Path]) -> list[Path]:
             for path in reversed(missing):
                 path.mkdir()
                 made.append(path)
+            hold(folder, held)
             with tempfile.TemporaryFile(dir=folder) as probe:
                 probe.write(b"proxcgal")
+    except ConfigError:
+        _remove_empty(made)
+        raise
     except OSError as error:
-        remove_empty(made)
+        _remove_empty(made)
         raise ConfigError(f"--out {folder}: cannot be written: {error.strerror or error}") from None
     for folder in folders:
         for name in FILES:
@@ -96,7 +111,7 @@ def ready_folders(folders: Sequence[Path]) -> list[Path]:
     return made
 
 
-def remove_empty(folders: Sequence[Path]) -> None:
+def _remove_empty(folders: Sequence[Path]) -> None:
     """Removes those of the folders, innermost last, that nothing was written to."""
     for path in reversed(folders):
         with contextlib.suppress(OSError):

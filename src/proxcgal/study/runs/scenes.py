@@ -3,6 +3,7 @@
 import functools
 import sys
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -29,7 +30,7 @@ from proxcgal.scenario.walkthrough_scenario import GuidedScenario, WalkScenario
 from proxcgal.study.jobs import Job
 from proxcgal.study.runs.joint import run_joint
 from proxcgal.study.runs.pictures import draw_figures, draw_motion
-from proxcgal.study.runs.preparation import check_setup, ready_folders, remove_empty
+from proxcgal.study.runs.preparation import check_setup, ready_folders
 from proxcgal.study.runs.walkthrough import run_walkthrough
 from proxcgal.study.trial_simulation import simulate_all, simulate_trial
 from proxcgal.study.workers import Pool, default_workers
@@ -74,12 +75,11 @@ def run_scenes(
     for plan in plans:
         check_setup(plan.scenario, plan.controllers, quiet=quiet)
     made = origin(command)
-    if together is not None:
-        ready_folders([together])
-    summaries = _perform(plans, made, workers, pictures, quiet)
-    if together is not None:
-        write_json(together / "run.json", made)
-        write_json(together / "summary.json", combined(summaries))
+    with nullcontext() if together is None else ready_folders([together]):
+        summaries = _perform(plans, made, workers, pictures, quiet)
+        if together is not None:
+            write_json(together / "run.json", made)
+            write_json(together / "summary.json", combined(summaries))
     print(table(summaries))
     for summary in summaries:
         for line in coverage_lines(summary["scenario"], summary["closest_points"]):
@@ -103,10 +103,12 @@ def _perform(
 ) -> list[Summary]:
     """One summary per plan, as written to its folder."""
     trials = [(plan, name) for plan in plans for name in plan.controllers]
-    new = ready_folders([plan.folder for plan in plans])
     summaries = []
     try:
-        with Pool(workers or default_workers(len(trials))) as pool:
+        with (
+            ready_folders([plan.folder for plan in plans]),
+            Pool(workers or default_workers(len(trials))) as pool,
+        ):
             logs = iter(_simulate(pool, trials, quiet))
             grouped = [[next(logs) for _ in plan.controllers] for plan in plans]
             for plan, own in zip(plans, grouped, strict=True):
@@ -119,8 +121,6 @@ def _perform(
         kept = [str(path) for plan in plans for path in sorted(plan.folder.glob("*.mcap"))]
         text = "kept: " + ", ".join(kept) if kept else "nothing was kept"
         raise KeyboardInterrupt(text) from None
-    finally:
-        remove_empty(new)
     return summaries
 
 

@@ -11,7 +11,7 @@ from proxcgal.core.provenance import origin
 from proxcgal.core.tables import aligned
 from proxcgal.scenario.walkthrough_scenario import WalkScenario
 from proxcgal.study.plotting import png
-from proxcgal.study.runs.preparation import ready_folders, remove_empty
+from proxcgal.study.runs.preparation import ready_folders
 from proxcgal.study.walkthrough.figures import ratings_figure, teach_figure, trip_figure
 from proxcgal.trial.walkthrough.run import WalkResult, run_walk
 from proxcgal.trial.walkthrough.setup import WalkSetup
@@ -44,10 +44,9 @@ def run_walkthrough(scenario: WalkScenario, folder: Path, command: str, *, quiet
     check_duration(scenario)  # before the files of an older run are removed
     guard = setup.notes()
     print("\n".join(guard))
-    made = ready_folders([folder])
-    for name in (RECORDING, FIGURE, TABLE, TRAJECTORY, RATINGS):
-        (folder / name).unlink(missing_ok=True)
-    try:
+    with ready_folders([folder]):
+        for name in (RECORDING, FIGURE, TABLE, TRAJECTORY, RATINGS):
+            (folder / name).unlink(missing_ok=True)
         with ProgressBar("teaching", [1.0], "", quiet=quiet) as progress:
             result = run_walk(
                 setup, seed=scenario.seed, recording=folder / RECORDING,
@@ -56,8 +55,6 @@ def run_walkthrough(scenario: WalkScenario, folder: Path, command: str, *, quiet
         if ratings:
             write_bytes(folder / RATINGS, png(ratings_figure(ratings)))
         summary = _write(setup, result, folder, about | {"guard": guard})
-    finally:
-        remove_empty(made)
     print("\n".join(walkthrough_lines(summary)))
 
 

@@ -9,7 +9,7 @@ from proxcgal.core.progress import ProgressBar
 from proxcgal.core.provenance import machine, origin
 from proxcgal.scenario.scenario import Scenario
 from proxcgal.study.plotting import png
-from proxcgal.study.runs.preparation import ready_folders, remove_empty
+from proxcgal.study.runs.preparation import ready_folders
 from proxcgal.study.timing.cloud_figure import cloud_figure
 from proxcgal.study.timing.comparison import compare, cycle_verdict, sweep_table
 from proxcgal.study.timing.grid import (
@@ -47,20 +47,18 @@ def run_sweep(
     """
     vertices, clouds = (QUICK_VERTICES, QUICK_CLOUDS) if short else (VERTICES, tuple(REACH))
     about = origin(command)
-    made = ready_folders([folder])
     try:
-        grids = _prepare(scenarios, vertices, clouds, quiet)
-        cells = _measure(grids, QUICK if short else FULL, quiet)
-        summary = sweep_summary(cells, machine())
-        files = {f"{scenario.name}.toml": scenario.to_toml().encode() for scenario in scenarios}
-        files |= _pictures(cells, grids) | {"samples.csv": _samples(cells)}
-        files |= {"run.json": as_json(about), "summary.json": as_json(summary)}
-        for name, content in files.items():
-            write_bytes(folder / name, content)
+        with ready_folders([folder]):
+            grids = _prepare(scenarios, vertices, clouds, quiet)
+            cells = _measure(grids, QUICK if short else FULL, quiet)
+            summary = sweep_summary(cells, machine())
+            files = {f"{scenario.name}.toml": scenario.to_toml().encode() for scenario in scenarios}
+            files |= _pictures(cells, grids) | {"samples.csv": _samples(cells)}
+            files |= {"run.json": as_json(about), "summary.json": as_json(summary)}
+            for name, content in files.items():
+                write_bytes(folder / name, content)
     except KeyboardInterrupt:
         raise KeyboardInterrupt("nothing was kept") from None
-    finally:
-        remove_empty(made)
     comparisons = compare(summary["cells"])
     print(sweep_table(comparisons))
     print(cycle_verdict(comparisons))
