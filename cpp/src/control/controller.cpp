@@ -1,5 +1,6 @@
 #include "proxcgal/control/controller.hpp"
 
+#include <Eigen/SVD>
 #include <cmath>
 
 #include "arm_following.hpp"
@@ -20,7 +21,7 @@
 namespace proxcgal {
 namespace {
 
-constexpr double kRigid = 1e-6;          // how far a goal's rotation may be from orthonormal
+constexpr double kRigid = 1e-3;          // how far a goal's rotation may be from orthonormal
 constexpr double kSpeedRounding = 1e-9;  // [rad/s] or [m/s]
 constexpr double kFarOutside = 1.0;      // [rad] or [m]
 
@@ -28,6 +29,17 @@ bool is_rigid(const Pose& T) {
   return T.matrix().allFinite() &&
          (T.linear() * T.linear().transpose() - Eigen::Matrix3d::Identity()).norm() < kRigid &&
          T.linear().determinant() > 0.0;
+}
+
+/// The nearest rigid pose: numbers rounded to four decimals leave a rotation that is none.
+Pose orthonormal(const Pose& T) {
+  constexpr double exact = 1e-12;
+  if ((T.linear() * T.linear().transpose() - Eigen::Matrix3d::Identity()).norm() < exact) return T;
+  Pose out = T;
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(T.linear(),
+                                              Eigen::ComputeFullU | Eigen::ComputeFullV);
+  out.linear() = svd.matrixU() * svd.matrixV().transpose();
+  return out;
 }
 
 const Limits& with_limits(const Robot& robot, const Limits& limits) {
@@ -131,7 +143,7 @@ struct Controller::Impl {
 
   /// The goal, or where the tool is: with a goal that cannot be used it goes nowhere.
   Pose usable_goal(const Pose& goal) {
-    if (is_rigid(goal)) return goal;
+    if (is_rigid(goal)) return orthonormal(goal);
     note(Reason::kGoalInvalid);
     return posture.T_WT;
   }

@@ -37,7 +37,9 @@ SET = (
     "skin.check_mounts=false",
 )  # fmt: skip
 EARLIEST, LATEST = 0.3, 0.6  # [s] of the onset, drawn: the arm moves
-RECOVERY = 0.5  # [s] after the fault's end, by when the arm must be free again
+#: [s] after the fault's end, by when the arm must be free again: HOLD clears 0.5 s after the first
+#: clean scan.
+RECOVERY = 0.7
 COLUMNS = (
     "right", "latency_ms", "reached", "worst_mode", "told", "recovered", "same_commands",
     "no_flight", "qd_max",

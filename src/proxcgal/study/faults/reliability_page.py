@@ -216,7 +216,7 @@ folder, with the figures of that campaign.
 Every fault is put in while the arm moves among panel, walls and cabinet, at a random moment and a
 random sensor; the `[[fault]]` tables of docs/scenarios.md do the same in any scenario.
 A run is right when the required mode comes in time and no farther one, the finding is
-told, the arm is free again half a second after the fault, and, where no command may change, the
+told, the arm is free again 0.7 s after the fault, and, where no command may change, the
 commands are those of the run without the fault, to the bit. Latency is from the fault's onset, told
 at the next tick: it may pass its bound by a tick of 10 ms. Robots meet the same draws, run by run:
 where the onset and the sensors' rate alone decide, their latencies are the same.
