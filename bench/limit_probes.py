@@ -58,9 +58,14 @@ def drive(
     """Moves the arm among known points.
 
     Args:
+        robot: at rest at the start.
+        q: (n_q,) where it starts [rad].
         points_at: (n, 3) in world, by time [m].
         velocity_at: theirs, (3,), or None where it is not known [m/s].
+        seconds: length of the run.
+        goal: (4, 4) T_WT; left out: where the tool is at the start.
         intervals: [s] between ticks; left out: the nominal period.
+        **settings: of the controller.
     """
     ctrl, run, time = controller(robot, **settings), Run(), 0.0
     goal = robot.tool_pose(q) if goal is None else goal
@@ -226,14 +231,16 @@ def balls(robot: px.Robot, runs: int, told: bool = False) -> str:
         some = table[table[:, 0] == speed]
         short = some[:, 2] < np.minimum(REACHABLE, some[:, 3] - 0.02)
         lines.append(
-            f"  {speed:.1f} m/s: least {some[:, 1].min():.3f}, median {np.median(some[:, 1]):.3f} m;"
-            f" final least {some[:, 2].min():.3f} m, short {short.sum()} of {len(some)};"
+            f"  {speed:.1f} m/s: least {some[:, 1].min():.3f}, median"
+            f" {np.median(some[:, 1]):.3f} m; final least {some[:, 2].min():.3f} m, short {short.sum()} of {len(some)};"
             f" own closing under 0.10 m at most {some[:, 4].max():.3f} m/s"
         )
     return "\n".join(lines)
 
 
-def plate(center_W: np.ndarray, along: np.ndarray, up: np.ndarray, half: float = 0.12) -> np.ndarray:
+def plate(
+    center_W: np.ndarray, along: np.ndarray, up: np.ndarray, half: float = 0.12
+) -> np.ndarray:
     """Points of a square, 5 mm apart."""
     grid = np.arange(-half, half + 1e-9, 0.005)
     u, v = (each.ravel()[:, None] for each in np.meshgrid(grid, grid))

@@ -1,8 +1,8 @@
 #include <chrono>
 
 #include "pipeline.hpp"
-#include "proxcgal/pipeline/limit.hpp"
 #include "proxcgal/pipeline/distance.hpp"
+#include "proxcgal/pipeline/limit.hpp"
 
 namespace proxcgal::bench {
 namespace {

@@ -132,7 +132,8 @@ class TickChecks {
   }
 
   /// Inside d_min nothing comes nearer along the closest direction, and nearer than d_stop no link
-  /// to any point, faster than braking allows; and the pair is no farther than what the cloud holds.
+  /// to any point, faster than braking allows; and the pair is no farther than what the cloud
+  /// holds.
   void check_approach(const JointVector& q, const Points& cloud_W, const TickOutput& out) {
     robot_.update(q, posture_);
     check_pair(cloud_W, out);

@@ -1,6 +1,5 @@
-#include "proxcgal/pipeline/limit.hpp"
-
 #include "limit_names.hpp"
+#include "proxcgal/pipeline/limit.hpp"
 #include "stack_arguments.hpp"
 #include "topics.hpp"
 
@@ -35,9 +34,9 @@ Limited limited(BoundLimiter& self, nb::handle q, nb::handle qd_last, double ela
                 const std::vector<ApproachCap>& caps, const std::vector<RetreatRow>& retreats) {
   const JointVector wanted = vector_from(nominal, "nominal", self.n, Take::kConvert, false);
   require_joints(tasks, self.n);
-  const LimitState& state = self.limiter.begin(
-      vector_from(q, "q", self.n, Take::kConvert, false),
-      vector_from(qd_last, "qd_last", self.n, Take::kConvert, false), elapsed);
+  const LimitState& state =
+      self.limiter.begin(vector_from(q, "q", self.n, Take::kConvert, false),
+                         vector_from(qd_last, "qd_last", self.n, Take::kConvert, false), elapsed);
   const LimitOutput& out = self.limiter.limit({wanted, tasks, caps, retreats});
   return {out.qd,
           state.interval.low,

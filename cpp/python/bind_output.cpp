@@ -102,7 +102,8 @@ void bind_output(nb::module_& m) {
       .def_prop_ro(
           "zone", [](const NamedFinding& f) { return f.finding.zone; },
           "-1 where none is concerned.")
-      .def_ro("link", &NamedFinding::link, "Name of the link concerned, or of the joint; None for none.")
+      .def_ro("link", &NamedFinding::link,
+              "Name of the link concerned, or of the joint; None for none.")
       .def_prop_ro(
           "age", [](const NamedFinding& f) { return f.finding.age; }, "[s] of the data concerned.")
       .def_prop_ro(

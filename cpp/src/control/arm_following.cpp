@@ -38,8 +38,7 @@ int ArmFollowing::judge(double time, const JointVector& q) const {
   const double span = time - entry(first).time;
   for (Eigen::Index j = 0; j < q.size(); ++j) {
     const double mean = (q[j] - entry(first).q[j]) / span;
-    const double room =
-        kNoise + tolerance_ * std::max(std::abs(least[j]), std::abs(most[j]));
+    const double room = kNoise + tolerance_ * std::max(std::abs(least[j]), std::abs(most[j]));
     if (mean < least[j] - room || mean > most[j] + room) return static_cast<int>(j);
   }
   return -1;

@@ -132,7 +132,8 @@ struct Controller::Impl {
     return joint < 0;
   }
 
-  /// A joint that is over a radian or a metre outside its limits: no arm goes there, but degrees do.
+  /// A joint that is over a radian or a metre outside its limits: no arm goes there, but degrees
+  /// do.
   int far_outside(const JointVector& q) const {
     for (Eigen::Index j = 0; j < q.size(); ++j) {
       if (q[j] < limits.q_min[j] - kFarOutside || q[j] > limits.q_max[j] + kFarOutside)
@@ -188,8 +189,7 @@ struct Controller::Impl {
 
   /// Every distance that limits this tick's velocity.
   void gather(const detail::DistanceScene& scene) {
-    if (scene.perception != nullptr)
-      rows.add_silent_views(clock.now(), posture, *scene.perception);
+    if (scene.perception != nullptr) rows.add_silent_views(clock.now(), posture, *scene.perception);
     if (!config.limit.distances) return;
     rows.add_links(scene, control_points);
     if (out.pair) rows.keep_nearest(out.trusted_distance, limiter.state());

@@ -6,7 +6,7 @@
 namespace proxcgal::detail {
 namespace {
 
-constexpr double kBlindMotion = 0.02;  // [m/s] slower motion into a silent view is not reported
+constexpr double kBlindMotion = 0.02;   // [m/s] slower motion into a silent view is not reported
 constexpr double kStiffest = 10.0;      // [1/s]
 constexpr double kFarthestReach = 1.5;  // [m] of a search round a link
 
@@ -58,8 +58,8 @@ void DistanceRows::reach(const LimitState& state, const JointVector& qd_last, do
     const Vector3 center_W = posture.T_WL[static_cast<std::size_t>(link)] * bounds.center;
     robot_.jacobian(posture, link, center_W, J);
     // No point of the link is faster than this, whatever the tick commands.
-    double fastest = (J.topRows<3>() * qd_last).norm() +
-                     bounds.radius * (J.bottomRows<3>() * qd_last).norm();
+    double fastest =
+        (J.topRows<3>() * qd_last).norm() + bounds.radius * (J.bottomRows<3>() * qd_last).norm();
     for (Eigen::Index j = 0; j < change.size(); ++j)
       fastest +=
           change[j] * (J.col(j).head<3>().norm() + bounds.radius * J.col(j).tail<3>().norm());
@@ -82,11 +82,11 @@ double DistanceRows::shortened(const DistanceScene& scene, const ControlPair& co
   if (scene.perception == nullptr) return 0.0;
   const Perception& perception = *scene.perception;
   const PointOrigin& origin = perception.origins()[static_cast<std::size_t>(point)];
-  const double less = robot_.mesh_error(control.link) + config_.limit.sigmas * perception.sigma(point);
+  const double less =
+      robot_.mesh_error(control.link) + config_.limit.sigmas * perception.sigma(point);
   if (origin.sensor < 0 || point >= perception.seen_points()) return less;
   const auto sensor = static_cast<std::size_t>(origin.sensor);
-  const double late =
-      perception.freshness().age(sensor, scene.time) - config_.monitor.fresh_within;
+  const double late = perception.freshness().age(sensor, scene.time) - config_.monitor.fresh_within;
   return less + config_.monitor.approach_speed * std::max(0.0, late);
 }
 
@@ -134,10 +134,10 @@ void DistanceRows::keep_nearest(double nearest, const LimitState& state) {
   if (!whole_body_ || spec == nullptr) return;
   // Inside d_min the nearest pair comes no nearer, whatever the other rows ask for, and those that
   // are hardly farther off hardly nearer: between two equals nothing jumps.
-  const double beyond = std::max(0.0, nearest - spec->d_min) /
-                        (state.reaction + 0.5 * state.braking_time);
-  const double stiffness = std::min(
-      kStiffest, std::exp(-1.0) / config_.limit.loop_delay(config_.period));
+  const double beyond =
+      std::max(0.0, nearest - spec->d_min) / (state.reaction + 0.5 * state.braking_time);
+  const double stiffness =
+      std::min(kStiffest, std::exp(-1.0) / config_.limit.loop_delay(config_.period));
   for (ApproachCap& cap : caps_) {
     if (cap.kind != LimitKind::kApproach) continue;
     const double farther = std::max(0.0, cap.distance - nearest);
@@ -223,8 +223,7 @@ void DistanceRows::report_blind_motion(const JointVector& nominal, Monitor& moni
     if (!(view.silent_for > config_.monitor.hold_after) || view.sensor == reported) continue;
     if (!(-caps_[view.cap].row.dot(nominal) > kBlindMotion)) continue;
     reported = view.sensor;
-    monitor.add(
-        {.reason = Reason::kBlindMotion, .sensor = view.sensor, .age = view.silent_for});
+    monitor.add({.reason = Reason::kBlindMotion, .sensor = view.sensor, .age = view.silent_for});
   }
 }
 

@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::int64_t kSteps = 120;  // pairs of subtrees in one tick, all searches together
 constexpr double kStale = 1e-3;       // [m] links that moved less since are not searched again
-constexpr int kPostures = 200;         // in which links that are always near one another are near
+constexpr int kPostures = 200;        // in which links that are always near one another are near
 constexpr double kAlwaysNear = 0.05;  // [m]
 constexpr double kAhead = 0.05;       // [m] searched beyond the task's reach, so as to rest longer
 

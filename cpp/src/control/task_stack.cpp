@@ -28,8 +28,7 @@ void TaskStack::build_rows(const Avoidance& spec, std::size_t level, const Postu
   if (config_.control_point == ControlPoint::kSensor) {
     controls = control_points.sensor(skin_, posture, cloud_W, velocities);
   } else if (spec.nearest > 1) {
-    controls =
-        control_points.links(robot_, posture, spec.nearest, links_within(out), velocities);
+    controls = control_points.links(robot_, posture, spec.nearest, links_within(out), velocities);
   } else if (out.pair) {
     controls = control_points.one(trusted.control(out, velocities.of(out.pair->point)));
   }

@@ -96,8 +96,8 @@ double Bvh::winding_number(const Vector3& point, double far) const {
       const Vector3 apart = part.center - point;
       const double distance = apart.norm();
       if (distance > far * part.radius) {
-        winding += part.area_vector.dot(apart) /
-                   (4.0 * std::numbers::pi * distance * distance * distance);
+        winding +=
+            part.area_vector.dot(apart) / (4.0 * std::numbers::pi * distance * distance * distance);
       } else {
         pending[n++] = child;
       }

@@ -92,8 +92,8 @@ class Perception {
     std::array<Vector3, kZones> raw_W, kept_W;
     std::array<std::uint8_t, kZones> zone;
     std::array<double, kZones> tolerance, sigma;  // [m] of the points kept
-    bool leaves = false;                   // the points below are no longer in the cloud
-    bool doubtful = false;                 // its last scan is one of a payload that is stuck
+    bool leaves = false;                          // the points below are no longer in the cloud
+    bool doubtful = false;                        // its last scan is one of a payload that is stuck
     ScanView view;
     int n_left = 0;
     std::array<RememberedPoint, kZones> left;

@@ -93,7 +93,8 @@ struct Limiter::Impl {
     // closes the distance by more.
     ApproachCap nearer = cap;
     nearer.distance -= std::max(0.0, -cap.row.dot(overrun));
-    const double c = std::max(0.0, approach_speed(config, nearer, state.reaction, state.braking_time));
+    const double c =
+        std::max(0.0, approach_speed(config, nearer, state.reaction, state.braking_time));
     // (1) row qd >= min(-c, row qd_brake): the braking command fulfils it, whatever the row is.
     return std::min(-c, cap.row.dot(state.qd_brake));
   }
@@ -122,9 +123,8 @@ struct Limiter::Impl {
       row.binds = least(retreat.row, state.interval) < rate;
       programme.weight[k] = retreat_weight(retreat);
       // Beyond d_stop a row leaves (2a) by and by: no row enters or leaves in a step.
-      programme.allowance[k] =
-          std::max(0.0, rate) *
-          ramp(retreat.distance, config.d_stop, config.d_stop + kLeavesWithin);
+      programme.allowance[k] = std::max(0.0, rate) *
+                               ramp(retreat.distance, config.d_stop, config.d_stop + kLeavesWithin);
     }
     return true;
   }
@@ -188,7 +188,8 @@ struct Limiter::Impl {
     out.status = LimitStatus::kBraking;
     if (n_rows == 0) return;
     // (2a)
-    clamped = ((1.0 - stand) * in.nominal).cwiseMax(state.interval.low).cwiseMin(state.interval.high);
+    clamped =
+        ((1.0 - stand) * in.nominal).cwiseMax(state.interval.low).cwiseMin(state.interval.high);
     // Nearer than d_stop every bit of distance counts.
     levels.calm(stand * ramp(nearest, config.d_stop, config.d_stop + kLeavesWithin));
     if (!levels.least_violation(programme, clamped, candidate)) return;
@@ -300,8 +301,8 @@ const LimitState& Limiter::begin(const JointVector& q, const JointVector& qd_las
   Impl& me = *impl_;
   const auto n = me.limits.qd_max.size();
   me.begin();
-  me.state.usable = q.size() == n && q.allFinite() && usable(qd_last, n) && std::isfinite(elapsed) &&
-                    std::isfinite(joint_state_age);
+  me.state.usable = q.size() == n && q.allFinite() && usable(qd_last, n) &&
+                    std::isfinite(elapsed) && std::isfinite(joint_state_age);
   // Where nothing is known there is nothing that a braking command could start from.
   me.out.qd.setZero();
   if (!me.state.usable) return me.state;

@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "proxcgal/pipeline/limit.hpp"
 #include "proxcgal/error.hpp"
+#include "proxcgal/pipeline/limit.hpp"
 
 namespace proxcgal {
 namespace {

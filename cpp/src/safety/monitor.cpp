@@ -165,8 +165,8 @@ void Monitor::count_holds(double time) {
       --n_begun_;
     }
     begun_[static_cast<std::size_t>(n_begun_++)] = {finding.reason, time};
-    const auto count = std::count_if(
-        begun_.begin(), begun_.begin() + n_begun_, [&](const Begun& each) {
+    const auto count =
+        std::count_if(begun_.begin(), begun_.begin() + n_begun_, [&](const Begun& each) {
           return each.reason == finding.reason && time - each.time < config_.held_off_within;
         });
     if (count >= config_.held_off_count && config_.held_off_within > 0.0) held_off_ = true;

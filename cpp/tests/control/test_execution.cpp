@@ -25,9 +25,8 @@ std::vector<int> links_of_rows(const Robot& robot, const Posture& posture, const
     const bool inside = robot.tree(pair.link).inside(T_WL.inverse() * pair.obstacle_W);
     return inside ? -pair.distance : pair.distance;
   };
-  std::sort(pairs.begin(), pairs.end(), [&](const auto& x, const auto& y) {
-    return signed_distance(x) < signed_distance(y);
-  });
+  std::sort(pairs.begin(), pairs.end(),
+            [&](const auto& x, const auto& y) { return signed_distance(x) < signed_distance(y); });
   std::vector<int> links;
   for (const ClosestPair& pair : pairs) {
     ControlPair control{.link = pair.link, .control_W = pair.surface_W};

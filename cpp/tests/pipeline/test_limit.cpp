@@ -41,7 +41,8 @@ TEST(Limit, StaysInsideTheIntervalsAndTheCapsWhateverTheProgramme) {
     Limiter limiter(one.limits, {}, kDt);
     const LimitOutput& out = one.through(limiter);
     ASSERT_TRUE(out.qd.allFinite());
-    ASSERT_TRUE((limiter.state().interval.low.array() <= limiter.state().interval.high.array()).all());
+    ASSERT_TRUE(
+        (limiter.state().interval.low.array() <= limiter.state().interval.high.array()).all());
     ASSERT_TRUE((out.qd.array() >= limiter.state().interval.low.array()).all()) << trial;
     ASSERT_TRUE((out.qd.array() <= limiter.state().interval.high.array()).all()) << trial;
     for (const ApproachCap& cap : one.caps)

@@ -107,10 +107,10 @@ struct LimitInput {
 
 /// State of a tick, and what of it limits every velocity.
 struct LimitState {
-  bool usable = false;     ///< joint state, last command and interval are finite
-  JointInterval interval;  ///< (0)
-  JointVector qd_brake;    ///< all joints brake together, inside the interval
-  double reaction = 0.0;   ///< T of (1) [s]
+  bool usable = false;        ///< joint state, last command and interval are finite
+  JointInterval interval;     ///< (0)
+  JointVector qd_brake;       ///< all joints brake together, inside the interval
+  double reaction = 0.0;      ///< T of (1) [s]
   double braking_time = 0.0;  ///< [s] until all joints rest
 };
 

@@ -69,9 +69,10 @@ inline constexpr auto fields<LimitConfig> = field_table(
           "Time constant of the arm's velocity control."),
     field(&LimitConfig::scan_latency, "scan_latency", "s", between(0, 1),
           "Nominal age of a scan at its tick; counts in the approach caps only."),
-    field(&LimitConfig::period_margin, "period_margin", "", between(1, 10),
-          "Longest time that a command may be held, over the longest recent time between two ticks; "
-          "at least 3 periods."),
+    field(
+        &LimitConfig::period_margin, "period_margin", "", between(1, 10),
+        "Longest time that a command may be held, over the longest recent time between two ticks; "
+        "at least 3 periods."),
     field(&LimitConfig::level_ratio, "level_ratio", "", above(0).at_most(1),
           "Weight of a level of the stack over the one above it, for the velocity nearest to the "
           "solver's."),

@@ -44,12 +44,14 @@ inline constexpr auto fields<MonitorConfig> = field_table(
           "Time without a cause before HOLD clears."),
     field(&MonitorConfig::ramp, "ramp", "s", above(0),
           "Time in which the nominal motion comes back from rest to its full speed."),
-    field(&MonitorConfig::held_off_count, "held_off_count", "", at_least(1),
-          "HOLDs of one cause within `held_off_within` that hold the arm until `Controller.reset`."),
+    field(
+        &MonitorConfig::held_off_count, "held_off_count", "", at_least(1),
+        "HOLDs of one cause within `held_off_within` that hold the arm until `Controller.reset`."),
     field(&MonitorConfig::held_off_within, "held_off_within", "s", at_least(0).or_infinite(),
           "Time in which HOLDs of one cause are counted; 0: never held off."),
     field(&MonitorConfig::following_tolerance, "following_tolerance", "", above(0).or_infinite(),
-          "Share of a joint's commanded velocity by which its motion may differ before the arm counts "
+          "Share of a joint's commanded velocity by which its motion may differ before the arm "
+          "counts "
           "as not following; inf: never."),
     field(&MonitorConfig::missed_deadlines, "missed_deadlines", "", at_least(1),
           "Missed deadlines in a row that hold the arm."),
@@ -95,7 +97,8 @@ class Monitor {
   /// Mode after this tick's findings: DEGRADED is held for `clean_cycles`, HOLD for
   /// `hold_clear_after`. @param time  [s] of the controller's own clock
   Mode conclude(double time);
-  /// Leaves STOP and what held the arm off; effective only when the last tick had no cause for STOP.
+  /// Leaves STOP and what held the arm off; effective only when the last tick had no cause for
+  /// STOP.
   bool reset();
 
   Mode mode() const { return mode_; }
