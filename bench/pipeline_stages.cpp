@@ -1,8 +1,8 @@
 #include <chrono>
 
 #include "pipeline.hpp"
-#include "proxcgal/pipeline/command.hpp"
 #include "proxcgal/pipeline/distance.hpp"
+#include "proxcgal/pipeline/limit.hpp"
 
 namespace proxcgal::bench {
 namespace {
@@ -102,6 +102,7 @@ void add_solving(const Cell& cell) {
     std::array<Task, 2> stack;
     Solution solution;
     JointVector qd = rest;
+    Limiter limiter(limits, LimitConfig::papers(), 0.01);
     Samples samples;
     for (auto _ : state) {
       samples.take(state, [&] {
@@ -109,8 +110,8 @@ void add_solving(const Cell& cell) {
         build_reach(Reach{}, robot, cell.posture, cell.goal, built[1]);
         for (std::size_t i = 0; i < 2; ++i) stack[i] = built[i].task;
         solve(stack, robot.n_q(), limits.qd_max, SolverConfig{}, solution);
-        const Admissible box = admissible(limits, cell.posture.q, rest, 0.01);
-        command({solution.rho.data(), 3}, stack, rest, box, qd);
+        limiter.begin(cell.posture.q, rest, 0.01);
+        qd = limiter.limit({.nominal = solution.qd(), .tasks = stack}).qd;
       });
       benchmark::DoNotOptimize(qd);
     }

@@ -106,7 +106,7 @@ class TickHarness {
       const TickOutput& out = controller_.tick_known(time, q_, points_, goal_, velocities_W);
       const bool taken = points_.allFinite() && velocities_W.allFinite() &&
                          (points_.size() == 0 || points_.cwiseAbs().maxCoeff() <= 1e9);
-      violation = checks_.after(q_, goal_, taken ? &points_ : nullptr, out);
+      violation = checks_.after(q_, taken ? &points_ : nullptr, out);
       if (violation.empty() && checks_.blames_a_sensor())
         violation = "a tick on known points blames a sensor";
     } else {
@@ -115,7 +115,7 @@ class TickHarness {
       make_scans();
       const TickOutput& out = controller_.tick(time, q_, scans_, goal_, late, stamp);
       const Points cloud = controller_.cloud_W();
-      violation = checks_.after(q_, goal_, &cloud, out);
+      violation = checks_.after(q_, &cloud, out);
     }
     return violation;
   }

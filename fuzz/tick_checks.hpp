@@ -7,8 +7,8 @@
 
 #include "perception/monotonic_clock.hpp"
 #include "proxcgal/control/controller.hpp"
-#include "proxcgal/pipeline/command.hpp"
 #include "proxcgal/pipeline/distance.hpp"
+#include "proxcgal/pipeline/limit.hpp"
 
 /// What every tick owes, whatever it is given: goal 1 of docs/reliability.md.
 namespace proxcgal::fuzz {
@@ -28,7 +28,9 @@ class TickChecks {
         posture_(robot_.make_posture()),
         last_(JointVector::Zero(robot_.n_q())),
         before_(last_),
-        clock_(controller.config().period) {
+        clock_(controller.config().period),
+        limiter_({robot_.q_min(), robot_.q_max(), robot_.qd_max(), robot_.qdd_max()},
+                 controller.config().limit, controller.config().period) {
     for (const TaskSpec& task : controller.config().tasks) {
       if (const auto* avoidance = std::get_if<Avoidance>(&task)) d_min_ = avoidance->d_min;
     }
@@ -37,15 +39,14 @@ class TickChecks {
   /// The last command that was issued.
   const JointVector& last() const { return last_; }
   const TickCounts& counts() const { return counts_; }
-  /// @param time  of the tick to come, on the caller's clock: a good one counts, by the nominal
-  ///              period at most and by the fiftieth part of it at least
+  /// @param time  of the tick to come, on the caller's clock: a good one counts, by the fiftieth
+  ///              part of the nominal period at least
   void before(double time) {
     before_ = last_;
     clock_.advance(time);
-    step_ = clock_.step();
   }
   /// [s] that the arm has moved with the last command.
-  double step() const { return step_; }
+  double step() const { return clock_.elapsed(); }
 
   /// Did the last tick find fault with a sensor?
   bool blames_a_sensor() const {
@@ -57,16 +58,16 @@ class TickChecks {
   /// @param q        given to the tick
   /// @param cloud_W  that the tick avoided, null where it had to refuse what it was given
   /// @return what was violated, empty for nothing
-  std::string after(const JointVector& q, const Pose& goal, const Points* cloud_W,
-                    const TickOutput& out) {
+  std::string after(const JointVector& q, const Points* cloud_W, const TickOutput& out) {
     problem_.str("");
+    limiter_.begin(q.size() == robot_.n_q() && q.allFinite() ? q : posture_.q, before_, step());
     if (out.qd.size() != robot_.n_q() || !out.qd.allFinite()) {
       problem_ << "command " << out.qd.transpose() << " is not finite";
       return problem_.str();
     }
     last_ = out.qd;
-    const bool usable = cloud_W != nullptr && q.size() == robot_.n_q() && q.allFinite() &&
-                        goal.matrix().allFinite() && !refused();
+    const bool usable =
+        cloud_W != nullptr && q.size() == robot_.n_q() && q.allFinite() && !refused();
     for (Eigen::Index j = 0; j < robot_.n_q(); ++j) {
       check_rates(j);
       if (usable) check_room(j, q[j]);
@@ -87,11 +88,12 @@ class TickChecks {
  private:
   static constexpr double kTolerance = 1e-9;
 
+  /// [s] that the joints had to change their velocity in.
+  double window() const { return std::min(step(), limiter_.max_period()); }
+
   bool refused() const {
     for (const Finding& finding : controller_.findings()) {
-      if (finding.reason == Reason::kJointStateInvalid || finding.reason == Reason::kGoalInvalid ||
-          finding.reason == Reason::kPointsInvalid)
-        return true;
+      if (brakes_only(finding.reason) || finding.reason == Reason::kPointsInvalid) return true;
     }
     return false;
   }
@@ -103,7 +105,7 @@ class TickChecks {
 
   void check_rates(Eigen::Index j) {
     const double qd = last_[j], fastest = robot_.qd_max()[j];
-    const double step = robot_.qdd_max()[j] * step_;
+    const double step = robot_.qdd_max()[j] * window();
     if (std::abs(qd) > fastest + kTolerance)
       problem_ << "joint " << j << " at " << qd << ", at most " << fastest << " is allowed; ";
     if (std::abs(qd - before_[j]) > step + kTolerance)
@@ -119,7 +121,7 @@ class TickChecks {
     const double sign = qd > 0.0 ? 1.0 : -1.0;
     const double room = sign > 0.0 ? robot_.q_max()[j] - q : q - robot_.q_min()[j];
     if (room < 0.0) ++counts_.outside;
-    const double most = robot_.qdd_max()[j] * step_;
+    const double most = robot_.qdd_max()[j] * window();
     const bool brakes = sign * (qd - before_[j]) <= -most + kTolerance;
     const double ticks = std::floor(std::abs(qd) / step) + 1.0;
     const double way = dt * ticks * (std::abs(qd) - 0.5 * step * (ticks - 1.0));
@@ -129,39 +131,43 @@ class TickChecks {
     }
   }
 
-  /// Inside d_min, nothing comes nearer along the closest direction unless the limits leave no
-  /// other choice; and the pair is no farther than what the cloud holds.
+  /// Inside d_min nothing comes nearer along the closest direction, and nearer than d_stop no link
+  /// to any point, faster than braking allows; and the pair is no farther than what the cloud
+  /// holds.
   void check_approach(const JointVector& q, const Points& cloud_W, const TickOutput& out) {
     robot_.update(q, posture_);
     check_pair(cloud_W, out);
-    if (!out.pair || !(out.trusted_distance < d_min_)) return;
-    ControlPair pair;
-    pair.link = out.pair->link;
-    pair.control_W = out.pair->surface_W;
-    pair.obstacle_W = out.pair->obstacle_W;
-    pair.distance = out.trusted_distance;
-    if (out.pair->distance < 1e-6) return;  // no direction is left to tell
+    check_stop(cloud_W);
+    if (!out.pair || !(out.pair->distance < d_min_)) return;
     ++counts_.inside;
-    const JointVector row = opening_row(robot_, posture_, pair);
-    const Limits limits{robot_.q_min(), robot_.q_max(), robot_.qd_max(), robot_.qdd_max()};
-    // Slowed down, the limits are tighter, and leave the less choice.
-    double least = 0.0;
-    for (const double scale : {1.0, controller_.config().monitor.degraded_scale}) {
-      Admissible box = admissible(limits, q, before_, controller_.config().period, scale);
-      for (Eigen::Index j = 0; j < row.size(); ++j) {  // as much change as the time allows
-        const double change = robot_.qdd_max()[j] * step_;
-        box.low[j] = std::clamp(box.steady_low[j], before_[j] - change, before_[j] + change);
-        box.high[j] = std::clamp(box.steady_high[j], before_[j] - change, before_[j] + change);
-      }
-      double best = 0.0;  // as fast outward as the box allows at all
-      for (Eigen::Index j = 0; j < row.size(); ++j)
-        best += row[j] * (row[j] > 0.0 ? box.high[j] : box.low[j]);
-      least = std::min(least, best);
+    check_row(*out.pair, "in d_min");
+  }
+
+  void check_stop(const Points& cloud_W) {
+    if (cloud_W.rows() == 0 || found(Reason::kWorkBounded)) return;
+    for (int link = 0; link < robot_.n_links(); ++link) {
+      if (robot_.spec().links[static_cast<std::size_t>(link)].joint < 0) continue;
+      const ClosestPair pair =
+          closest_pair(robot_, posture_, cloud_W, Method::kFast, {.links = std::span(&link, 1)});
+      if (pair.found() && pair.distance < controller_.config().limit.d_stop)
+        check_row(pair, "in d_stop");
     }
+  }
+
+  void check_row(const ClosestPair& pair, const char* where) {
+    if (pair.distance < 1e-6) return;  // no direction is left to tell
+    const Pose& T_WL = posture_.T_WL[static_cast<std::size_t>(pair.link)];
+    const bool inside = robot_.tree(pair.link).inside(T_WL.inverse() * pair.obstacle_W);
+    const ControlPair control{.link = pair.link,
+                              .control_W = pair.surface_W,
+                              .obstacle_W = pair.obstacle_W,
+                              .distance = inside ? -pair.distance : pair.distance};
+    const JointVector row = opening_row(robot_, posture_, control);
+    const double least = std::min(0.0, row.dot(limiter_.state().qd_brake));
     if (row.dot(last_) < least - kTolerance) {
-      problem_ << "link " << pair.link << ", " << out.trusted_distance << " m from an obstacle ("
-               << out.pair->distance << " measured), opens at " << row.dot(last_)
-               << " m/s; at least " << least << " is possible; ";
+      problem_ << "link " << pair.link << ", " << control.distance << " m from an obstacle ("
+               << where << "), opens at " << row.dot(last_) << " m/s; braking gives " << least
+               << "; ";
     }
   }
 
@@ -195,7 +201,7 @@ class TickChecks {
   Posture posture_;
   JointVector last_, before_;
   detail::MonotonicClock clock_;
-  double step_ = 0.0;
+  Limiter limiter_;
   double d_min_ = 0.0;
   TickCounts counts_;
   std::ostringstream problem_;

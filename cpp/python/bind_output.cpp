@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "convert.hpp"
+#include "limit_names.hpp"
 #include "tick_output.hpp"
 #include "topics.hpp"
 
@@ -14,8 +15,19 @@ std::string link_name(const Robot& robot, int link) {
   return link < 0 ? "" : robot.spec().links[static_cast<std::size_t>(link)].name;
 }
 
+std::string joint_name(const Robot& robot, int joint) {
+  return joint < 0 ? "" : robot.spec().joints[static_cast<std::size_t>(joint)].name;
+}
+
+/// Of some findings `link` is a joint.
+bool names_joint(Reason reason) {
+  return reason == Reason::kNotFollowing || reason == Reason::kJointStateUnits;
+}
+
 NamedFinding named_finding(const Robot& robot, const Finding& finding) {
-  return {finding, finding.link < 0 ? std::nullopt : std::optional(link_name(robot, finding.link))};
+  if (finding.link < 0) return {finding, std::nullopt};
+  return {finding, names_joint(finding.reason) ? joint_name(robot, finding.link)
+                                               : link_name(robot, finding.link)};
 }
 
 }  // namespace
@@ -36,7 +48,12 @@ std::vector<NamedRecord> last_ticks(const Controller& controller) {
 Output kept(const Controller& controller, const TickOutput& out) {
   const Robot& robot = controller.robot();
   Output copy;
+  copy.nominal_qd = out.nominal_qd;
   copy.qd = out.qd;
+  for (const ActiveLimit& row : out.limited) {
+    const bool joint = row.kind == LimitKind::kJoint;
+    copy.limited.push_back({row, joint ? joint_name(robot, row.link) : link_name(robot, row.link)});
+  }
   if (out.pair) copy.pair = named(robot, *out.pair);
   copy.origin = out.pair_origin;
   copy.pair_age = out.pair_age;
@@ -85,7 +102,8 @@ void bind_output(nb::module_& m) {
       .def_prop_ro(
           "zone", [](const NamedFinding& f) { return f.finding.zone; },
           "-1 where none is concerned.")
-      .def_ro("link", &NamedFinding::link, "Name of the link concerned; None for none.")
+      .def_ro("link", &NamedFinding::link,
+              "Name of the link concerned, or of the joint; None for none.")
       .def_prop_ro(
           "age", [](const NamedFinding& f) { return f.finding.age; }, "[s] of the data concerned.")
       .def_prop_ro(
@@ -120,13 +138,32 @@ void bind_output(nb::module_& m) {
           "zone", [](const NamedRecord& r) { return r.record.origin.zone; },
           "Its zone, -1 for none.")
       .def_ro("findings", &NamedRecord::findings, "The first eight.");
+  nb::class_<NamedLimit>(m, "ActiveLimit", "A row of the limit stage that changed the command.")
+      .def_prop_ro(
+          "kind", [](const NamedLimit& l) { return kind_name(l.row.kind); },
+          "'joint', 'approach', 'own_approach', 'floor', 'unknown', 'retreat' or 'own_retreat'.")
+      .def_ro("link", &NamedLimit::link, "Name of the link; of the joint where kind is 'joint'.")
+      .def_prop_ro(
+          "distance", [](const NamedLimit& l) { return l.row.distance; },
+          "[m] that the row reckons with; inf for a joint and for 'unknown'.")
+      .def_prop_ro(
+          "rate", [](const NamedLimit& l) { return l.row.rate; },
+          "[m/s] at which the command opens that distance; the joint's velocity.")
+      .def("__repr__", [](const NamedLimit& l) {
+        return std::string("ActiveLimit(kind='") + kind_name(l.row.kind) + "', link='" + l.link +
+               "', distance=" + std::to_string(l.row.distance) +
+               ", rate=" + std::to_string(l.row.rate) + ")";
+      });
   nb::class_<Report>(m, "TaskReport", "What one task wanted and got in this tick, row by row.")
       .def_ro("name", &Report::name, "Of the task.")
       .def_ro("rate", &Report::rate, "(m,) reference rate.")
       .def_ro("activation", &Report::activation, "(m,) in [0, 1].")
       .def_ro("residual", &Report::residual, "(m,) rate - J qd.");
   nb::class_<Output>(m, "TickOutput", "Everything one tick tells.")
-      .def_ro("qd", &Output::qd, "(n_q,) admissible joint velocity [rad/s or m/s].")
+      .def_ro("nominal_qd", &Output::nominal_qd, "(n_q,) what the solver asked for [rad/s or m/s].")
+      .def_ro("qd", &Output::qd, "(n_q,) admissible joint velocity: what is sent [rad/s or m/s].")
+      .def_ro("limited", &Output::limited,
+              "Rows of the limit stage that made `qd` another than `nominal_qd`.")
       .def_ro("pair", &Output::pair,
               "Nearest of the links that joints can move away; None when nothing is in view.")
       .def_prop_ro(

@@ -41,8 +41,8 @@ NB_MODULE(_core, m) {
   bind_pipeline(m);
   bind_solve(m);
   bind_task(m);
-  bind_command(m);
   bind_config(m);
+  bind_limit(m);
   bind_output(m);
   bind_controller(m);
   bind_guard(m);

@@ -29,9 +29,16 @@ struct Report {
   Eigen::VectorXd rate, activation, residual;
 };
 
+/// A row of the limit stage with the name of its link, or joint.
+struct NamedLimit {
+  ActiveLimit row;
+  std::string link;
+};
+
 /// A tick's output that a user may keep: the core's own is reused.
 struct Output {
-  Eigen::VectorXd qd;
+  Eigen::VectorXd nominal_qd, qd;
+  std::vector<NamedLimit> limited;
   std::optional<NamedPair> pair;
   PointOrigin origin;
   double pair_age = 0.0;

@@ -11,7 +11,7 @@ void bind_sense(nanobind::module_& m);
 void bind_pipeline(nanobind::module_& m);
 void bind_solve(nanobind::module_& m);
 void bind_task(nanobind::module_& m);
-void bind_command(nanobind::module_& m);
+void bind_limit(nanobind::module_& m);
 void bind_config(nanobind::module_& m);
 void bind_output(nanobind::module_& m);
 void bind_controller(nanobind::module_& m);

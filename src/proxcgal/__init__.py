@@ -9,6 +9,7 @@ from importlib.metadata import version as _version
 from typing import TYPE_CHECKING
 
 from proxcgal._core import (
+    ActiveLimit,
     Admittance,
     AdmittanceConfig,
     Avoidance,
@@ -25,6 +26,7 @@ from proxcgal._core import (
     IsoSeparation,
     JointLimits,
     JointSpec,
+    LimitConfig,
     LinkCapsule,
     LinkSpec,
     Manipulability,
@@ -86,6 +88,7 @@ if TYPE_CHECKING:
 __version__ = _version("proxcgal")
 
 __all__ = [
+    "ActiveLimit",
     "Admittance",
     "AdmittanceConfig",
     "Avoidance",
@@ -107,6 +110,7 @@ __all__ = [
     "JointLimits",
     "JointRobotServer",
     "JointSpec",
+    "LimitConfig",
     "LinkCapsule",
     "LinkSpec",
     "Manipulability",

@@ -91,8 +91,8 @@ WRONG: list[tuple[Callable[[], Any], str]] = [
      "q_reference has 100 rows, one a joint: at most 32 are supported"),
     (lambda: px.GuardConfig(capsules=[], q_reference=Q, qdd_max=TOO_MANY),
      "qdd_max has 100 rows, one a joint: at most 32 are supported"),
-    (lambda: _core.admissible(*[TOO_MANY] * 6, 0.01),
-     "q has 100 rows, one a joint: at most 32 are supported"),
+    (lambda: _core.Limiter(*[TOO_MANY] * 4),
+     "qd_max has 100 rows, one a joint: at most 32 are supported"),
 ]  # fmt: skip
 
 

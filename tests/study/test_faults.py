@@ -196,7 +196,7 @@ def test_a_run_too_short_to_show_that_the_arm_recovers_is_refused() -> None:
     wishes = CampaignRequest(
         runs=1, seed=0, scenarios=("timing_ur10e",), overrides=("duration=1.0",)
     )
-    with pytest.raises(ConfigError, match=r"--set duration=1: must be more than 1\.7 s"):
+    with pytest.raises(ConfigError, match=r"--set duration=1: must be more than 1\.9 s"):
         plan(wishes)
 
 

@@ -93,6 +93,7 @@ enum class Reason : std::uint8_t {
   kRowSmall,            ///< a scalar task row had a norm under 0.01 before scaling
   kNotExecuted,         ///< avoidance asked for more than limits or rank allow
   kAvoidanceStuck,      ///< inside d_min, and not executed for a while
+  kPinched,             ///< what is to be retreated from on one side is blocked by another
   kContact,             ///< a pair inside d_min was taken for body since: kept as an obstacle
   kOutsideLimits,       ///< a joint is outside its position limits
   kDeadlineMissed,      ///< the caller's word
@@ -100,6 +101,10 @@ enum class Reason : std::uint8_t {
   kWorkBounded,         ///< a search, the filter or memory was cut short: a bound, points kept
   kPointsInvalid,       ///< known points or their velocity not finite, or too many
   kMountsUnchecked,     ///< nobody has said yet that the sensors sit where they are said to
+  kJointStateUnits,     ///< so far outside its limits that it may be in degrees
+  kNotFollowing,        ///< the arm does not do what it is commanded; `link` is the joint
+  kLoopSlow,            ///< ticks come later than the nominal period, on average
+  kHeldOff,             ///< held for the same reason again and again: until `reset`
 };
 
 /// One thing the monitor found in this tick.

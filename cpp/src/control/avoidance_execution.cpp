@@ -1,7 +1,5 @@
 #include "avoidance_execution.hpp"
 
-#include <optional>
-
 namespace proxcgal::detail {
 namespace {
 
@@ -9,30 +7,18 @@ constexpr double kExecuted = 0.5;   // share of the demanded rate that counts as
 constexpr double kEngaged = 0.5;    // activation from which avoidance must be executed
 constexpr double kRounding = 1e-9;  // [s] of sums of periods: it decides about no tick
 
-/// The command that position and velocity limits allow once there was time to speed up.
-JointVector in_time(const TaskStack& stack, const Commanded& commanded) {
-  Admissible steady = commanded.box;
-  steady.low = steady.steady_low;
-  steady.high = steady.steady_high;
-  JointVector qd;
-  command(commanded.levels, stack.tasks(), commanded.qd_last, steady, qd);
-  return qd;
-}
-
 }  // namespace
 
 AvoidanceExecution::AvoidanceExecution(const ControllerConfig& config)
     : stuck_after_(config.monitor.stuck_after),
       whole_body_(config.control_point == ControlPoint::kWholeBody) {}
 
-void AvoidanceExecution::judge(double time, const TaskStack& stack, const Commanded& commanded,
-                               const TrustedDistance& trusted, const TickOutput& out,
-                               Monitor& monitor) {
+void AvoidanceExecution::judge(double time, const TaskStack& stack, const TrustedDistance& trusted,
+                               const TickOutput& out, Monitor& monitor) {
   // Outside d_min the goal may well hold against it: there the arm may come to rest.
   // The baseline moves another point than the pair's, and is left as it is published.
   const bool may_be_stuck = whole_body_ && trusted.inside(out);
   int stuck_link = -1;
-  std::optional<JointVector> later;
   for (std::size_t level = 0; level < stack.tasks().size(); ++level) {
     if (!stack.is_avoidance(level)) continue;
     const Task& task = stack.tasks()[level];
@@ -42,12 +28,7 @@ void AvoidanceExecution::judge(double time, const TaskStack& stack, const Comman
       const bool engaged = task.activation[row] > kEngaged && task.rate[row] > 0.0;
       if (!(engaged && missing[row] > bearable)) continue;
       monitor.add({.reason = Reason::kNotExecuted, .link = stack.link(level, row)});
-      if (!may_be_stuck || stuck_link >= 0) continue;
-      // Is it acceleration alone that the row is short of, as after a HOLD that has cleared? Then
-      // it has its share once there was time.
-      if (!commanded.cut_back && !later) later = in_time(stack, commanded);
-      if (commanded.cut_back || residual(task, *later)[row] > bearable)
-        stuck_link = stack.link(level, row);
+      if (may_be_stuck && stuck_link < 0) stuck_link = stack.link(level, row);
     }
   }
   stuck(time, stuck_link, monitor);

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "proxcgal/error.hpp"
+#include "signed_pair.hpp"
 
 namespace proxcgal::detail {
 namespace {
@@ -63,7 +64,7 @@ ControlPoints::ControlPoints(const Robot& robot, const Skin& skin, const Control
   passed_.reserve(links_.size());
   passed_over_.assign(static_cast<std::size_t>(robot.n_links()), false);
   per_link_.resize(links_.size());
-  sorted_.reserve(links_.size());
+  each_.resize(links_.size());
   chosen_.reserve(std::max<std::size_t>(links_.size(), 1));
 }
 
@@ -184,31 +185,36 @@ std::span<const ControlPair> ControlPoints::sensor(const Skin& skin, const Postu
   return chosen_;
 }
 
-std::span<const ControlPair> ControlPoints::links(const Robot& robot, const Posture& posture,
-                                                  const PointsRef& cloud_W, int count,
-                                                  double within,
-                                                  const ObstacleVelocities& velocities,
-                                                  Monitor& monitor) {
-  chosen_.clear();
-  sorted_.clear();
+void ControlPoints::search_each(const Robot& robot, const Posture& posture,
+                                const PointsRef& cloud_W, std::span<const double> within,
+                                Monitor& monitor) {
   for (std::size_t row = 0; row < links_.size(); ++row) {
-    const ClosestPair pair = closest_pair(robot, posture, cloud_W, method_,
-                                          {.links = std::span(&links_[row], 1),
-                                           .before = per_link_[row],
-                                           .within = within,
-                                           .steps = &steps_});
-    if (pair.lower_bound) note(monitor, Reason::kWorkBounded, pair.link);
-    if (!pair.found()) continue;
-    per_link_[row] = pair;
-    sorted_.push_back(pair);
+    if (!(within[static_cast<std::size_t>(links_[row])] > 0.0)) {
+      each_[row] = {};
+      continue;
+    }
+    each_[row] = closest_pair(robot, posture, cloud_W, method_,
+                              {.links = std::span(&links_[row], 1),
+                               .before = each_[row],
+                               .within = within[static_cast<std::size_t>(links_[row])],
+                               .steps = &steps_});
+    if (each_[row].lower_bound) note(monitor, Reason::kWorkBounded, each_[row].link);
   }
-  std::sort(sorted_.begin(), sorted_.end(),
-            [](const auto& x, const auto& y) { return x.distance < y.distance; });
-  for (const ClosestPair& pair : sorted_) {
-    if (static_cast<int>(chosen_.size()) == count || !pair.found()) break;
-    const ControlPair control = control_of(pair, velocities.of(pair.point));
+}
+
+std::span<const ControlPair> ControlPoints::links(const Robot& robot, const Posture& posture,
+                                                  int count, double within,
+                                                  const ObstacleVelocities& velocities) {
+  chosen_.clear();
+  for (const ClosestPair& pair : each_) {
+    if (!pair.found() || !(pair.distance < within)) continue;
+    const ControlPair control = signed_pair(robot, posture, pair, velocities);
     if (row_norm(robot, posture, control) >= min_row_norm_) chosen_.push_back(control);
   }
+  std::sort(chosen_.begin(), chosen_.end(),
+            [](const auto& x, const auto& y) { return x.distance < y.distance; });
+  if (chosen_.size() > static_cast<std::size_t>(count))
+    chosen_.erase(chosen_.begin() + count, chosen_.end());
   return chosen_;
 }
 

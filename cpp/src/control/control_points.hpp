@@ -38,11 +38,17 @@ class ControlPoints {
   std::span<const ControlPair> sensor(const Skin& skin, const Posture& posture,
                                       const PointsRef& cloud_W,
                                       const ObstacleVelocities& velocities);
-  /// The `count` nearest links that joints can move away, one pair each, nearest first.
+  /// Searches the nearest pair of each link that counts, for `links` and `each`.
+  /// @param within  [m] one per link of the robot: only a nearer pair counts
+  void search_each(const Robot& robot, const Posture& posture, const PointsRef& cloud_W,
+                   std::span<const double> within, Monitor& monitor);
+  /// What `search_each` found, in no order; `found()` is false where nothing was near enough.
+  std::span<const ClosestPair> each() const { return each_; }
+  /// Of those the `count` nearest links that joints can move away, with the sign of their distance,
+  /// nearest first.
   /// @param within  [m] only nearer ones count: a row that is not active changes nothing
-  std::span<const ControlPair> links(const Robot& robot, const Posture& posture,
-                                     const PointsRef& cloud_W, int count, double within,
-                                     const ObstacleVelocities& velocities, Monitor& monitor);
+  std::span<const ControlPair> links(const Robot& robot, const Posture& posture, int count,
+                                     double within, const ObstacleVelocities& velocities);
   /// A pair that is known already.
   std::span<const ControlPair> one(const ControlPair& control);
 
@@ -60,7 +66,7 @@ class ControlPoints {
   int link_ = -1;                      // that avoidance acted on last
   double switched_ = -kInfinity;       // [s] when that last changed
   ClosestPair before_;                 // the last that was returned: where the next search begins
-  std::vector<ClosestPair> per_link_, sorted_;
+  std::vector<ClosestPair> per_link_, each_;
   std::vector<ControlPair> chosen_;
 };
 

@@ -1,10 +1,14 @@
 #include "proxcgal/control/controller.hpp"
 
+#include <Eigen/SVD>
 #include <cmath>
 
-#include "approach_limits.hpp"
+#include "arm_following.hpp"
 #include "avoidance_execution.hpp"
 #include "control_points.hpp"
+#include "distance_rows.hpp"
+#include "loop_rate.hpp"
+#include "nominal_speed.hpp"
 #include "obstacle_velocities.hpp"
 #include "perception/monotonic_clock.hpp"
 #include "perception/perception.hpp"
@@ -17,13 +21,31 @@
 namespace proxcgal {
 namespace {
 
-constexpr double kRigid = 1e-6;          // how far a goal's rotation may be from orthonormal
+constexpr double kRigid = 1e-3;          // how far a goal's rotation may be from orthonormal
 constexpr double kSpeedRounding = 1e-9;  // [rad/s] or [m/s]
+constexpr double kFarOutside = 1.0;      // [rad] or [m]
 
 bool is_rigid(const Pose& T) {
   return T.matrix().allFinite() &&
          (T.linear() * T.linear().transpose() - Eigen::Matrix3d::Identity()).norm() < kRigid &&
          T.linear().determinant() > 0.0;
+}
+
+/// The nearest rigid pose: numbers rounded to four decimals leave a rotation that is none.
+Pose orthonormal(const Pose& T) {
+  constexpr double exact = 1e-12;
+  if ((T.linear() * T.linear().transpose() - Eigen::Matrix3d::Identity()).norm() < exact) return T;
+  Pose out = T;
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(T.linear(),
+                                              Eigen::ComputeFullU | Eigen::ComputeFullV);
+  out.linear() = svd.matrixU() * svd.matrixV().transpose();
+  return out;
+}
+
+const Limits& with_limits(const Robot& robot, const Limits& limits) {
+  if (limits.qd_max.allFinite() && limits.qdd_max.allFinite()) return limits;
+  throw ConfigError("robot '" + robot.spec().name +
+                    "' has a joint without a speed or acceleration limit: give both");
 }
 
 }  // namespace
@@ -37,9 +59,13 @@ struct Controller::Impl {
   detail::ControlPoints control_points;
   detail::TaskStack stack;
   detail::TrustedDistance trusted;
-  detail::ApproachLimits approach_limits;
+  detail::DistanceRows rows;
   detail::AvoidanceExecution execution;
+  detail::ArmFollowing following;
+  detail::NominalSpeed nominal_speed;
+  detail::LoopRate loop_rate;
   Limits limits;
+  Limiter limiter;
   detail::MonotonicClock clock;
 
   detail::TickHistory history;
@@ -68,18 +94,18 @@ struct Controller::Impl {
         control_points(*robot, skin, config),
         stack(*robot, skin, config),
         trusted(*robot, config),
-        approach_limits(*robot, skin, config),
+        rows(*robot, skin, config),
         execution(config),
+        following(config.limit, config.period, config.monitor.following_tolerance),
+        nominal_speed(config.monitor.degraded_scale, config.monitor.ramp),
+        loop_rate(config.period),
         limits{robot->q_min(), robot->q_max(), robot->qd_max(), robot->qdd_max()},
+        limiter(with_limits(*robot, limits), config.limit, config.period),
         clock(config.period),
         mounts_accepted(!config.monitor.await_mounts),
         posture(robot->make_posture()) {
-    if (!limits.qd_max.allFinite() || !limits.qdd_max.allFinite()) {
-      throw ConfigError("robot '" + robot->spec().name +
-                        "' has a joint without a speed or acceleration limit: give both");
-    }
     qd_last = JointVector::Zero(robot->n_q());
-    out.qd = qd_last;
+    out.qd = out.nominal_qd = qd_last;
     out.n_tasks = static_cast<int>(config.tasks.size());
   }
 
@@ -93,25 +119,34 @@ struct Controller::Impl {
     monitor.add({.reason = lost ? Reason::kJointStateLost : Reason::kJointStateStale, .age = age});
   }
 
-  /// Joint state and goal are usable; else the reason is noted.
-  bool usable(double time, const JointVector& q, std::optional<double> q_stamp, const Pose& goal) {
-    const bool joints = q.size() == robot->n_q() && q.allFinite();
-    if (!joints) note(Reason::kJointStateInvalid);
+  /// The joint state can be used; else the reason is noted.
+  bool joints_usable(double time, const JointVector& q, std::optional<double> q_stamp) {
+    const bool good = q.size() == robot->n_q() && q.allFinite();
+    if (!good) note(Reason::kJointStateInvalid);
     if (q_stamp) judge_age(time - *q_stamp);
-    const bool rigid = is_rigid(goal);
-    if (!rigid) note(Reason::kGoalInvalid);
-    return joints && rigid;
+    if (!good) return false;
+    const int joint = far_outside(q);
+    if (joint >= 0) note(Reason::kJointStateUnits, joint);
+    const int stray = following.judge(clock.now(), q);
+    if (stray >= 0) note(Reason::kNotFollowing, stray);
+    return joint < 0;
   }
 
-  /// The limits of a nominal period, with no more change of velocity than the time since the last
-  /// command allows: a tick may come early. Braking in time stays possible: until the next command
-  /// the joint moves at this one for a nominal period at most.
-  Admissible admissible_now(const JointVector& q, double scale) const {
-    Admissible box = admissible(limits, q, qd_last, config.period, scale);
-    const JointVector change = clock.step() * limits.qdd_max;
-    box.low = box.steady_low.cwiseMax(qd_last - change).cwiseMin(qd_last + change);
-    box.high = box.steady_high.cwiseMax(qd_last - change).cwiseMin(qd_last + change);
-    return box;
+  /// A joint that is over a radian or a metre outside its limits: no arm goes there, but degrees
+  /// do.
+  int far_outside(const JointVector& q) const {
+    for (Eigen::Index j = 0; j < q.size(); ++j) {
+      if (q[j] < limits.q_min[j] - kFarOutside || q[j] > limits.q_max[j] + kFarOutside)
+        return static_cast<int>(j);
+    }
+    return -1;
+  }
+
+  /// The goal, or where the tool is: with a goal that cannot be used it goes nowhere.
+  Pose usable_goal(const Pose& goal) {
+    if (is_rigid(goal)) return orthonormal(goal);
+    note(Reason::kGoalInvalid);
+    return posture.T_WT;
   }
 
   /// The nearest pair ([WA] Algorithm 2), and how far its distance is to be trusted.
@@ -143,24 +178,36 @@ struct Controller::Impl {
     return {solution.rho.data(), static_cast<std::size_t>(solution.levels) + 1};
   }
 
-  /// The velocities of this tick, slower while degraded: by the last tick's mode, as this one's
-  /// findings are not complete yet.
-  Admissible admissible_by_mode(const JointVector& q) const {
-    return admissible_now(q, monitor.slowed() ? config.monitor.degraded_scale : 1.0);
+  /// The nearest pair of each link, as far as something could limit the link's motion.
+  void find_each(const PointsRef& cloud_W, const detail::ObstacleVelocities& velocities) {
+    rows.begin();
+    if (config.limit.distances)
+      rows.reach(limiter.state(), qd_last, clock.elapsed(), posture, velocities.fastest());
+    rows.reach_at_least(stack.links_within(out));
+    control_points.search_each(*robot, posture, cloud_W, rows.within(), monitor);
   }
 
-  /// From the solution to the velocity that is sent.
-  /// @return  was it reduced because of a region that is not seen?
-  bool limit(std::span<const JointVector> levels, bool sensed, const Admissible& box) {
-    command(levels, stack.tasks(), qd_last, box, out.qd);
-    stack.catch_up(levels, box, out.qd);
-    const JointVector before = out.qd;
-    if (sensed)
-      approach_limits.slow_into_unseen(clock.now(), posture, perception, box, out, monitor);
-    const bool cut_back = (out.qd.array() != before.array()).any();
-    // After the above: a known obstacle takes precedence over a region that is not seen.
-    approach_limits.keep_off(posture, trusted, box, out);
-    return cut_back;
+  /// Every distance that limits this tick's velocity.
+  void gather(const detail::DistanceScene& scene) {
+    if (scene.perception != nullptr) rows.add_silent_views(clock.now(), posture, *scene.perception);
+    if (!config.limit.distances) return;
+    rows.add_links(scene, control_points);
+    if (out.pair) rows.keep_nearest(out.trusted_distance, limiter.state());
+    if (config.control_point == ControlPoint::kSensor && out.control.link >= 0)
+      rows.add_sensor_point(posture, out.control);
+    rows.add_own(posture, stack.own_spec(), stack.own_pairs());
+    rows.add_floor(posture);
+  }
+
+  /// From the solution to the velocity that is sent: the only place that changes it.
+  void limit() {
+    const LimitOutput& limited = limiter.limit({.nominal = out.nominal_qd,
+                                                .tasks = stack.tasks(),
+                                                .caps = rows.caps(),
+                                                .retreats = rows.retreats()});
+    out.qd = limited.qd;
+    out.limited = limited.limited();
+    if (limited.pinched) note(Reason::kPinched, limited.n_retreats > 0 ? rows.nearest_link() : -1);
   }
 
   /// From the joint state and a cloud to an admissible velocity.
@@ -168,15 +215,21 @@ struct Controller::Impl {
   void act(const JointVector& q, const PointsRef& cloud_W, bool sensed,
            const detail::ObstacleVelocities& given, const Pose& goal) {
     detail::Stopwatch watch(config.timings);
-    find_nearest(cloud_W, sensed);                                              // Algorithm 2
-    stack.build(posture, cloud_W, velocities_of(cloud_W, sensed, given), goal,  // eqs. (4) to (10)
+    find_nearest(cloud_W, sensed);  // Algorithm 2
+    const detail::ObstacleVelocities velocities = velocities_of(cloud_W, sensed, given);
+    find_each(cloud_W, velocities);
+    nominal_speed.update(monitor.slowed(monitor.expected()), clock.elapsed(),
+                         limiter.state().braking_time);
+    stack.build(posture, cloud_W, velocities, goal, nominal_speed.share(),  // eqs. (4) to (10)
                 control_points, trusted, out, monitor);
+    gather({posture, cloud_W, velocities, sensed ? &perception : nullptr, clock.now()});
     out.timings.distance_us = watch.lap_us();
-    const std::span<const JointVector> levels = solve_stack();  // [iCAT] (4.7), (4.8)
-    const Admissible box = admissible_by_mode(q);
-    const bool cut_back = limit(levels, sensed, box);
+    solve(stack.tasks(), robot->n_q(), limits.qd_max, config.solver, solution);
+    out.nominal_qd = solution.qd();  // [iCAT] (4.7), (4.8)
+    rows.report_blind_motion(out.nominal_qd, monitor);
+    limit();
     out.timings.solve_us = watch.lap_us();
-    execution.judge(clock.now(), stack, {levels, qd_last, box, cut_back}, trusted, out, monitor);
+    execution.judge(clock.now(), stack, trusted, out, monitor);
     note_outside_limits(q);
   }
 
@@ -194,24 +247,37 @@ struct Controller::Impl {
     out.pair_remembered = row >= perception.seen_points();
   }
 
-  /// The mode that this tick's findings call for; HOLD and STOP brake instead of what was solved.
-  void conclude(const JointVector& q, bool usable) {
-    out.mode = monitor.conclude();
-    if (!usable || out.mode >= Mode::kHold) {
-      const JointVector& at = usable ? q : posture.q;  // the last posture that could be trusted
-      const Admissible box = admissible_now(at, 1.0);
-      decelerate(qd_last, box, out.qd);
-      if (usable) approach_limits.keep_off(posture, trusted, box, out);
+  /// The mode that this tick's findings call for. STOP, and what leaves the arm's own state in
+  /// doubt, brake instead of what was solved.
+  /// @param acted  there is a command of this tick
+  void conclude(const JointVector& q, bool acted) {
+    out.mode = monitor.conclude(clock.now());
+    if (!acted || monitor.brakes()) {
+      out.qd = limiter.brake().qd;
+      out.limited = {};
     }
+    if (!acted) out.nominal_qd = out.qd;
     qd_last = out.qd;
-    if (usable) stack.report(out);
+    if (acted) {
+      stack.report(out);
+      following.command(clock.now(), q, out.qd);
+    } else {
+      following.clear();
+    }
     history.add(clock.caller(), q, robot->n_q(), out, monitor.findings());
+  }
+
+  /// Begins the limit stage of this tick. @param q  the last that could be trusted
+  void begin_limit(const JointVector& q, double age) {
+    limiter.begin(q, qd_last, clock.elapsed(), std::isfinite(age) ? std::max(age, 0.0) : 0.0);
   }
 
   void begin(double time, bool late) {
     monitor.begin();
     monitor.deadline(late);
     if (!clock.advance(time)) note(Reason::kTimeInvalid);
+    if (loop_rate.slow(clock.elapsed())) note(Reason::kLoopSlow);
+    out.limited = {};
     out.pair.reset();
     out.pair_origin = {};
     out.pair_age = 0.0;
@@ -238,7 +304,8 @@ const TickOutput& Controller::tick(double time, const JointVector& q, std::span<
   detail::Stopwatch watch(me.config.timings);
   me.begin(time, late);
   if (!me.mounts_accepted) me.note(Reason::kMountsUnchecked);
-  const bool usable = me.usable(time, q, q_stamp, goal);
+  const bool usable = me.joints_usable(time, q, q_stamp);
+  me.begin_limit(usable ? q : me.posture.q, q_stamp ? time - *q_stamp : 0.0);
   if (usable) {
     me.perception.update(me.clock.now(), me.clock.delay(), q, scans, me.monitor);
     me.out.timings.sense_us = me.perception.sense_us;
@@ -247,7 +314,8 @@ const TickOutput& Controller::tick(double time, const JointVector& q, std::span<
     me.robot->update(q, me.posture);
     me.perception.remember(me.clock.now(), me.posture, me.monitor);
     me.out.timings.memory_us = me.perception.memory_us;
-    me.act(q, me.perception.cloud_W(), true, detail::ObstacleVelocities(me.none_W), goal);
+    me.act(q, me.perception.cloud_W(), true, detail::ObstacleVelocities(me.none_W),
+           me.usable_goal(goal));
     me.blame();
     me.trusted.watch(me.clock.now(), me.out, me.perception);
   }
@@ -262,7 +330,8 @@ const TickOutput& Controller::tick_known(double time, const JointVector& q,
   Impl& me = *impl_;
   detail::Stopwatch watch(me.config.timings);
   me.begin(time, false);
-  bool usable = me.usable(time, q, std::nullopt, goal);
+  bool usable = me.joints_usable(time, q, std::nullopt);
+  me.begin_limit(usable ? q : me.posture.q, 0.0);
   const Eigen::Index rows = velocities_W.rows();
   if (points_W.rows() > me.config.max_points || !points_W.allFinite() ||
       (rows > 1 && rows != points_W.rows()) || !velocities_W.allFinite() ||
@@ -270,8 +339,10 @@ const TickOutput& Controller::tick_known(double time, const JointVector& q,
     me.note(Reason::kPointsInvalid);
     usable = false;
   }
-  if (usable) me.robot->update(q, me.posture);
-  if (usable) me.act(q, points_W, false, detail::ObstacleVelocities(velocities_W), goal);
+  if (usable) {
+    me.robot->update(q, me.posture);
+    me.act(q, points_W, false, detail::ObstacleVelocities(velocities_W), me.usable_goal(goal));
+  }
   me.conclude(q, usable);
   me.out.timings.total_us = watch.lap_us();
   return me.out;
@@ -319,6 +390,7 @@ void Controller::go_on_from(const JointVector& qd) {
           std::to_string(most.size()) + " finite numbers within the joints' speed limits");
   impl_->qd_last = qd;
   impl_->out.qd = qd;
+  impl_->following.clear();
 }
 
 }  // namespace proxcgal

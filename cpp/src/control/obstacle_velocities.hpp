@@ -19,6 +19,9 @@ class ObstacleVelocities {
       return Vector3::Zero();
     return velocities_W_.row(velocities_W_.rows() == 1 ? 0 : point).transpose();
   }
+  double fastest() const {
+    return velocities_W_.rows() == 0 ? 0.0 : velocities_W_.rowwise().norm().maxCoeff();
+  }
 
  private:
   const PointsRef& velocities_W_;

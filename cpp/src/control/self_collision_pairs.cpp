@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <random>
 
 namespace proxcgal::detail {
 namespace {
 
 constexpr std::int64_t kSteps = 120;  // pairs of subtrees in one tick, all searches together
 constexpr double kStale = 1e-3;       // [m] links that moved less since are not searched again
+constexpr int kPostures = 200;        // in which links that are always near one another are near
+constexpr double kAlwaysNear = 0.05;  // [m]
 constexpr double kAhead = 0.05;       // [m] searched beyond the task's reach, so as to rest longer
 
 /// How many joints move one of two links and not the other; neighbours have one.
@@ -18,6 +21,27 @@ int joints_between(const Robot& robot, int a, int b) {
     if (robot.moves(joint, a) != robot.moves(joint, b)) ++count;
   }
   return count;
+}
+
+/// Are two links so near one another in every posture that their distance tells nothing?
+bool always_near(const Robot& robot, int a, int b) {
+  std::mt19937_64 engine(1);
+  Posture posture = robot.make_posture();
+  JointVector q(robot.n_q());
+  for (int trial = 0; trial < kPostures; ++trial) {
+    for (Eigen::Index j = 0; j < q.size(); ++j) {
+      const double low = std::max(robot.q_min()[j], -std::numbers::pi);
+      const double high = std::min(robot.q_max()[j], std::numbers::pi);
+      const double share = static_cast<double>(engine() >> 11U) * 0x1p-53;
+      q[j] = low + share * std::max(high - low, 0.0);
+    }
+    robot.update(q, posture);
+    const Pose& T_WA = posture.T_WL[static_cast<std::size_t>(a)];
+    const Pose& T_WB = posture.T_WL[static_cast<std::size_t>(b)];
+    if (std::isinf(robot.tree(a).distance(robot.tree(b), T_WA.inverse() * T_WB, kAlwaysNear)))
+      return false;
+  }
+  return true;
 }
 
 /// No point within the bounds moved farther between two poses [m].
@@ -35,14 +59,21 @@ SelfCollisionPairs::SelfCollisionPairs(const Robot& robot, const ControllerConfi
   const auto watch = [&](int a, int b) {
     watched_.push_back({.a = a, .b = b, .T_AB = Pose::Identity()});
   };
+  bool asked = false;
   for (const TaskSpec& task : config.tasks) {
     const auto* spec = std::get_if<SelfCollision>(&task);
     if (spec == nullptr) continue;
+    asked = true;
     for (const auto& [a, b] : spec->pairs) watch(robot.link_row(a), robot.link_row(b));
     for (int a = 0; spec->pairs.empty() && a < robot.n_links(); ++a) {
       for (int b = a + 1; b < robot.n_links(); ++b) {
         if (joints_between(robot, a, b) > 1) watch(a, b);
       }
+    }
+  }
+  for (int a = 0; !asked && config.limit.distances && a < robot.n_links(); ++a) {
+    for (int b = a + 1; b < robot.n_links(); ++b) {
+      if (joints_between(robot, a, b) > 1 && !always_near(robot, a, b)) watch(a, b);
     }
   }
   near_.reserve(watched_.size());

@@ -14,23 +14,21 @@ constexpr double kJustBeyond = 1e-6;  // [m]
 
 TaskStack::TaskStack(const Robot& robot, const Skin& skin, const ControllerConfig& config)
     : robot_(robot), skin_(skin), config_(config), self_collision_pairs_(robot, config) {
-  for (const TaskSpec& task : config.tasks) validate(task, robot);
+  for (const TaskSpec& task : config.tasks) {
+    validate(task, robot);
+    has_own_ = has_own_ || std::holds_alternative<SelfCollision>(task);
+  }
 }
 
 void TaskStack::build_rows(const Avoidance& spec, std::size_t level, const Posture& posture,
                            const PointsRef& cloud_W, const ObstacleVelocities& velocities,
                            ControlPoints& control_points, const TrustedDistance& trusted,
-                           TickOutput& out, Monitor& monitor) {
+                           TickOutput& out) {
   std::span<const ControlPair> controls;
   if (config_.control_point == ControlPoint::kSensor) {
     controls = control_points.sensor(skin_, posture, cloud_W, velocities);
   } else if (spec.nearest > 1) {
-    // The nearest link is told even where nothing is active yet.
-    const double nearest =
-        out.pair_distance() < kInfinity ? out.pair_distance() + kJustBeyond : 0.0;
-    const double within = std::max(spec.d_min + spec.buffer, nearest);
-    controls =
-        control_points.links(robot_, posture, cloud_W, spec.nearest, within, velocities, monitor);
+    controls = control_points.links(robot_, posture, spec.nearest, links_within(out), velocities);
   } else if (out.pair) {
     controls = control_points.one(trusted.control(out, velocities.of(out.pair->point)));
   }
@@ -44,22 +42,24 @@ void TaskStack::build_rows(const SelfCollision& spec, std::size_t level, const P
                            TickOutput& out, Monitor& monitor) {
   const std::span<const LinkPair> pairs =
       self_collision_pairs_.nearest(spec, robot_, posture, monitor);
+  own_pairs_ = pairs;
+  own_spec_ = spec;
   if (!pairs.empty() && out.own.a < 0) out.own = pairs.front();
   build_self_collision(spec, robot_, posture, pairs, built_[level]);
 }
 
 void TaskStack::build(const Posture& posture, const PointsRef& cloud_W,
-                      const ObstacleVelocities& velocities, const Pose& goal,
+                      const ObstacleVelocities& velocities, const Pose& goal, double nominal,
                       ControlPoints& control_points, const TrustedDistance& trusted,
                       TickOutput& out, Monitor& monitor) {
+  own_pairs_ = {};
   for (std::size_t level = 0; level < config_.tasks.size(); ++level) {
     BuiltTask& task = built_[level];
     std::visit(
         [&](const auto& spec) {
           using Spec = std::decay_t<decltype(spec)>;
           if constexpr (std::is_same_v<Spec, Avoidance>)
-            build_rows(spec, level, posture, cloud_W, velocities, control_points, trusted, out,
-                       monitor);
+            build_rows(spec, level, posture, cloud_W, velocities, control_points, trusted, out);
           if constexpr (std::is_same_v<Spec, Reach>) build_reach(spec, robot_, posture, goal, task);
           if constexpr (std::is_same_v<Spec, JointLimits>)
             build_joint_limits(spec, robot_, posture, task);
@@ -69,6 +69,9 @@ void TaskStack::build(const Posture& posture, const PointsRef& cloud_W,
             build_manipulability(spec, robot_, posture, task);
           if constexpr (std::is_same_v<Spec, SelfCollision>)
             build_rows(spec, level, posture, out, monitor);
+          // What the arm does on its own account; the others keep what must be kept.
+          if constexpr (std::is_same_v<Spec, Reach> || std::is_same_v<Spec, Manipulability>)
+            task.task.rate *= nominal;
         },
         config_.tasks[level]);
     const bool active = (task.task.activation.array() > 0.0).any();
@@ -76,26 +79,9 @@ void TaskStack::build(const Posture& posture, const PointsRef& cloud_W,
       monitor.add({.reason = Reason::kRowSmall});
     tasks_[level] = task.task;
   }
-}
-
-void TaskStack::catch_up(std::span<const JointVector> levels, const Admissible& box,
-                         JointVector& qd) const {
-  for (std::size_t level = config_.tasks.size(); level-- > 0;) {
-    if (!is_avoidance(level)) continue;
-    Admissible free = box;
-    for (std::size_t upper = 0; upper < level; ++upper) {
-      if (is_avoidance(upper)) continue;
-      const Task& task = tasks_[upper];
-      for (Eigen::Index row = 0; row < task.activation.size(); ++row) {
-        if (!(task.activation[row] > 0.0)) continue;
-        for (Eigen::Index joint = 0; joint < qd.size(); ++joint) {
-          if (task.jacobian(row, joint) == 0.0) continue;
-          free.low[joint] = free.high[joint] = qd[joint];
-        }
-      }
-    }
-    proxcgal::catch_up(levels, tasks_[level], free, qd);
-  }
+  // Own links are kept off one another in any stack.
+  if (config_.limit.distances && !has_own_)
+    own_pairs_ = self_collision_pairs_.nearest(own_spec_, robot_, posture, monitor);
 }
 
 void TaskStack::report(TickOutput& out) const {
@@ -104,6 +90,20 @@ void TaskStack::report(TickOutput& out) const {
     out.tasks[level] = {task_name(config_.tasks[level]), task.rate, task.activation,
                         residual(task, out.qd)};
   }
+}
+
+double TaskStack::links_within(const TickOutput& out) const {
+  if (config_.control_point == ControlPoint::kSensor) return 0.0;
+  double within = 0.0;
+  for (const TaskSpec& task : config_.tasks) {
+    const auto* spec = std::get_if<Avoidance>(&task);
+    if (spec == nullptr || spec->nearest == 1) continue;
+    // The nearest link is reported even where nothing is active yet.
+    const double nearest =
+        out.pair_distance() < kInfinity ? out.pair_distance() + kJustBeyond : 0.0;
+    within = std::max({within, spec->d_min + spec->buffer, nearest});
+  }
+  return within;
 }
 
 double TaskStack::engaged_within() const {

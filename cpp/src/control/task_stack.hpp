@@ -7,7 +7,6 @@
 #include "obstacle_velocities.hpp"
 #include "proxcgal/control/controller_config.hpp"
 #include "proxcgal/control/tick_output.hpp"
-#include "proxcgal/pipeline/command.hpp"
 #include "self_collision_pairs.hpp"
 #include "trusted_distance.hpp"
 
@@ -21,12 +20,14 @@ class TaskStack {
   TaskStack(const Robot& robot, const Skin& skin, const ControllerConfig& config);
 
   /// Rows for one tick; in `out` what the first rows of avoidance and self-collision act on.
+  /// @param nominal  in [0, 1]: share of their rates that the tasks of the nominal motion get
   void build(const Posture& posture, const PointsRef& cloud_W, const ObstacleVelocities& velocities,
-             const Pose& goal, ControlPoints& control_points, const TrustedDistance& trusted,
-             TickOutput& out, Monitor& monitor);
-  /// Avoidance makes up what the command gives it less than the solver does, with the joints of
-  /// which no more important task of another kind wants anything now.
-  void catch_up(std::span<const JointVector> levels, const Admissible& box, JointVector& qd) const;
+             const Pose& goal, double nominal, ControlPoints& control_points,
+             const TrustedDistance& trusted, TickOutput& out, Monitor& monitor);
+  /// The pairs of the robot's own links that are near, of the last `build`.
+  std::span<const LinkPair> own_pairs() const { return own_pairs_; }
+  /// What they keep: the stack's task, or its defaults where it has none.
+  const SelfCollision& own_spec() const { return own_spec_; }
   /// What each task wanted, and what is missing of it in the command that is issued.
   void report(TickOutput& out) const;
 
@@ -38,14 +39,15 @@ class TaskStack {
   int link(std::size_t level, Eigen::Index row) const {
     return links_[level][static_cast<std::size_t>(row)];
   }
+  /// Within this distance every link has a row of its own, 0 where only the nearest has one [m].
+  double links_within(const TickOutput& out) const;
   /// Within this distance having nothing to move away is a cause to hold [m].
   double engaged_within() const;
 
  private:
   void build_rows(const Avoidance& spec, std::size_t level, const Posture& posture,
                   const PointsRef& cloud_W, const ObstacleVelocities& velocities,
-                  ControlPoints& control_points, const TrustedDistance& trusted, TickOutput& out,
-                  Monitor& monitor);
+                  ControlPoints& control_points, const TrustedDistance& trusted, TickOutput& out);
   void build_rows(const SelfCollision& spec, std::size_t level, const Posture& posture,
                   TickOutput& out, Monitor& monitor);
 
@@ -56,6 +58,9 @@ class TaskStack {
   std::array<BuiltTask, kMaxLevels> built_;
   std::array<Task, kMaxLevels> tasks_;
   std::array<std::array<int, kMaxRows>, kMaxLevels> links_{};
+  std::span<const LinkPair> own_pairs_;
+  SelfCollision own_spec_;
+  bool has_own_ = false;  // the stack has a task for them
 };
 
 /// Settings with other values for the same tasks in the same order.

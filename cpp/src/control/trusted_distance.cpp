@@ -40,6 +40,7 @@ void TrustedDistance::of_known(const Posture& posture, TickOutput& out) {
   const Pose& T_WL = posture.T_WL[static_cast<std::size_t>(out.pair->link)];
   const bool inside = robot_.tree(out.pair->link).inside(into(T_WL, out.pair->obstacle_W));
   if (inside) out.trusted_distance = -out.pair->distance;
+  signed_distance_ = out.trusted_distance;
   // Where the point is on the surface, and no normal held before: out from the link's centre.
   if (apart.norm() > kTouching) {
     outward_W_ = apart.normalized() * (inside ? -1.0 : 1.0);
@@ -65,15 +66,19 @@ void TrustedDistance::of_sensed(double time, const Posture& posture, const Perce
     out.trusted_distance = std::max(pair.distance - shorter, 0.0);
   }
   if (!out.pair) return;
+  signed_distance_ = out.pair->distance;
   const Vector3 apart = out.pair->surface_W - out.pair->obstacle_W;
-  if (!perception.in_contact()) {
-    if (apart.norm() > kTouching) outward_W_ = apart.normalized();
+  if (!perception.in_contact(perception.origins()[static_cast<std::size_t>(out.pair->point)])) {
+    const Pose& T_WL = posture.T_WL[static_cast<std::size_t>(out.pair->link)];
+    const bool inside = robot_.tree(out.pair->link).inside(into(T_WL, out.pair->obstacle_W));
+    if (inside) out.trusted_distance = signed_distance_ = -out.pair->distance;
+    if (apart.norm() > kTouching) outward_W_ = apart.normalized() * (inside ? -1.0 : 1.0);
     return;
   }
   monitor.add({.reason = Reason::kContact, .link = out.pair->link});
   // Taken for body, so as near as noise: whether the point measured is in or out of the surface,
   // the normal that held before does.
-  if (apart.dot(outward_W_) < 0.0) out.trusted_distance = -out.pair->distance;
+  if (apart.dot(outward_W_) < 0.0) out.trusted_distance = signed_distance_ = -out.pair->distance;
 }
 
 ControlPair TrustedDistance::control(const TickOutput& out, const Vector3& velocity_W) const {
@@ -81,7 +86,7 @@ ControlPair TrustedDistance::control(const TickOutput& out, const Vector3& veloc
           .control_W = out.pair->surface_W,
           .obstacle_W = out.pair->obstacle_W,
           .obstacle_velocity_W = velocity_W,
-          .distance = out.trusted_distance,
+          .distance = signed_distance_,
           .fallback_normal_W = outward_W_};
 }
 
@@ -96,7 +101,7 @@ void TrustedDistance::watch(double time, const TickOutput& out, Perception& perc
   perception.hold(believed && out.pair_remembered ? out.pair->point : -1);
   // No zone shows what is remembered: there is none to watch.
   if (believed && !out.pair_remembered) {
-    perception.watch({out.pair_origin, out.pair->obstacle_W});
+    perception.watch({out.pair_origin, out.pair->obstacle_W, perception.stamp(out.pair->point)});
   } else {
     perception.watch({});
   }

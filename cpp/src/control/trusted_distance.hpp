@@ -25,7 +25,9 @@ class TrustedDistance {
   void of_sensed(double time, const Posture& posture, const Perception& perception,
                  ControlPoints& control_points, TickOutput& out, Monitor& monitor);
 
-  /// The pair as avoidance takes it: the trusted distance, and a normal that never turns over.
+  /// The pair as avoidance takes it: the distance as measured, with its sign, and a normal that
+  /// never turns over. What may have come since the scan limits the approach only: no assumed
+  /// motion drives the arm.
   ControlPair control(const TickOutput& out, const Vector3& velocity_W) const;
   /// Is there a pair inside d_min?
   bool inside(const TickOutput& out) const {
@@ -45,6 +47,7 @@ class TrustedDistance {
   double approach_speed_;                // [m/s]
   std::optional<Avoidance> avoidance_;   // the first of the stack
   double near_since_ = 0.0;              // [s] since when a pair has been inside d_min
+  double signed_distance_ = kInfinity;   // [m] of the pair, as measured
   Vector3 outward_W_ = Vector3::Zero();  // last normal of a pair that was surely outside
 };
 

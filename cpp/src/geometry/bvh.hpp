@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -70,13 +71,28 @@ class Bvh {
                           Vector3* on_this, Vector3* on_other, const PairWork& work,
                           bool& cut) const;
 
+  /// How often the surface goes round the point: 1 or -1 inside a closed one, 0 outside.
+  /// @param far  a subtree so many of its radii away counts as one dipole; infinity: none does
+  double winding_number(const Vector3& point, double far = kInfinity) const;
+  /// More than half round.
+  bool inside(const Vector3& point) const;
+
   BvhView view() const { return {nodes_.data(), blocks_.data(), scale_}; }
 
  private:
   struct Builder;
+  /// The triangles of a subtree as one.
+  struct Dipole {
+    Vector3 area_vector = Vector3::Zero();  ///< [m^2]
+    Vector3 center = Vector3::Zero();       ///< weighted by area
+    double area = 0.0;
+    double radius = 0.0;  ///< [m] about `center`
+  };
+  Dipole add_dipoles(std::int32_t row);
 
   std::vector<BvhNode> nodes_;  // root first
   std::vector<TriangleBlock> blocks_;
+  std::vector<std::array<Dipole, kWide>> dipoles_;  // of each node's children
   double scale_ = 0.0;  // largest coordinate: sets the rounding allowance
 };
 

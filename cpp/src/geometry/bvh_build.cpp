@@ -230,6 +230,8 @@ Bvh::Bvh(const Points& vertices, const Triangles& triangles) {
   blocks_.reserve(static_cast<std::size_t>(triangles.rows()) / 2);
   Builder builder(vertices, triangles, *this);
   builder.make_node(builder.part(0, static_cast<int>(triangles.rows())), 0);
+  dipoles_.resize(nodes_.size());
+  add_dipoles(0);
 }
 
 }  // namespace proxcgal::detail

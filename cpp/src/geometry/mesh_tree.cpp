@@ -21,8 +21,6 @@ using Triangle3 = Kernel::Triangle_3;
 using Primitive = CGAL::AABB_triangle_primitive<Kernel, std::vector<Triangle3>::const_iterator>;
 using CgalTree = CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>>;
 
-constexpr int kMostCrossings = 64;
-constexpr double kApart = 1e-7;  // [m]
 constexpr std::int64_t kAnySteps = std::numeric_limits<std::int64_t>::max();
 
 Kernel::Point_3 to_cgal(const Vector3& p) { return {p.x(), p.y(), p.z()}; }
@@ -162,37 +160,11 @@ double MeshTree::first_hit(const Vector3& origin_L, const Vector3& direction_L,
 bool MeshTree::inside(const Vector3& point_L) const {
   const Bounds& box = impl_->bounds;
   if ((point_L.array() < box.low.array() || point_L.array() > box.high.array()).any()) return false;
-  // Along no axis and in no symmetry plane, where drawn meshes have their edges.
-  static const std::array<Vector3, 3> rays{Vector3(0.5377, 0.2871, 0.7927).normalized(),
-                                           Vector3(-0.6113, 0.7411, -0.2777).normalized(),
-                                           Vector3(0.1931, -0.8263, -0.5291).normalized()};
-  int odd = 0;
-  for (const Vector3& ray : rays) {
-    int crossings = 0;
-    double from = 0.0;
-    for (; crossings < kMostCrossings; ++crossings) {
-      const double hit = impl_->bvh.first_hit(point_L, ray, from);
-      if (std::isinf(hit)) break;
-      from = hit + kApart;  // what lies nearer together is one wall
-    }
-    odd += crossings % 2;
-  }
-  return odd >= 2;
+  return impl_->bvh.inside(point_L);
 }
 
 double MeshTree::winding_number(const Vector3& point_L) const {
-  // The sum of the triangles' solid angles (Van Oosterom & Strackee 1983) over the full 4 pi.
-  double half_angles = 0.0;
-  const auto at = [&](Eigen::Index f, int k) {
-    return Vector3(impl_->vertices.row(impl_->triangles(f, k)).transpose() - point_L);
-  };
-  for (Eigen::Index f = 0; f < impl_->triangles.rows(); ++f) {
-    const Vector3 a = at(f, 0), b = at(f, 1), c = at(f, 2);
-    const double la = a.norm(), lb = b.norm(), lc = c.norm();
-    half_angles +=
-        std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
-  }
-  return half_angles / (2.0 * std::acos(-1.0));
+  return impl_->bvh.winding_number(point_L);
 }
 
 struct PairSearch::Impl {

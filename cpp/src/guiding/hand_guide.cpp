@@ -29,9 +29,10 @@ HandGuide::HandGuide(std::shared_ptr<const Robot> robot, HandGuideConfig config)
     : robot_(std::move(robot)),
       config_(checked(std::move(config), *robot_)),
       admittance_(config_.admittance),
-      limits_{robot_->q_min(), robot_->q_max(),
-              config_.qd_max.size() > 0 ? config_.qd_max : robot_->qd_max(),
-              config_.qdd_max.size() > 0 ? config_.qdd_max : robot_->qdd_max()},
+      qd_max_(config_.qd_max.size() > 0 ? config_.qd_max : robot_->qd_max()),
+      limiter_({robot_->q_min(), robot_->q_max(), qd_max_,
+                config_.qdd_max.size() > 0 ? config_.qdd_max : robot_->qdd_max()},
+               LimitConfig::papers(), config_.period),
       posture_(robot_->make_posture()) {
   task_.activation.setOnes(6);
   output_.qd.setZero(robot_->n_q());
@@ -45,11 +46,9 @@ const HandGuideOutput& HandGuide::step(const JointVector& q, const Vector6& forc
   output_.wanted = admittance_.step(force, engaged, config_.period);
   task_.jacobian = J;
   task_.rate = output_.wanted;
-  solve({&task_, 1}, robot_->n_q(), limits_.qd_max, config_.solver, solution_);
-  const Admissible box = admissible(limits_, q, output_.qd, config_.period);
-  const JointVector last = output_.qd;
-  command({solution_.rho.data(), static_cast<std::size_t>(solution_.levels) + 1}, {&task_, 1}, last,
-          box, output_.qd);
+  solve({&task_, 1}, robot_->n_q(), qd_max_, config_.solver, solution_);
+  limiter_.begin(q, output_.qd, config_.period);
+  output_.qd = limiter_.limit({.nominal = solution_.qd(), .tasks = {&task_, 1}}).qd;
   output_.achieved = J * output_.qd;
   if ((output_.achieved - output_.wanted).cwiseAbs().maxCoeff() > kHeldBack)
     admittance_.held_to(output_.achieved);

@@ -27,6 +27,7 @@ class MonotonicClock {
     const double step = now_ - before;
     const bool early = started_ && step < period_ - kRounding;
     step_ = early ? std::max(step, kShortest * period_) : period_;
+    elapsed_ = started_ ? std::max(step, kShortest * period_) : period_;
     if (!std::isfinite(caller)) return false;
     if (!good || !started_) offset_ = caller - now_;
     started_ = true;
@@ -40,13 +41,15 @@ class MonotonicClock {
   /// [s] since the last tick, the nominal period at most: what has passed for the joints'
   /// accelerations. By rounding at most 2.5 us more than truly has.
   double step() const { return step_; }
+  /// [s] since the last tick, however late this one is.
+  double elapsed() const { return elapsed_; }
 
  private:
   static constexpr double kLongestStep = 0.5;  // [s] a longer one is a clock that jumped
   static constexpr double kRounding = 1.5e-6;  // [s] that whole microseconds may take from a step
   static constexpr double kShortest = 0.02;    // of the period: a clock that crawls still brakes
   double period_;
-  double step_ = period_;
+  double step_ = period_, elapsed_ = period_;
   bool started_ = false;
   double caller_ = 0.0, now_ = 0.0;
   double offset_ = 0.0;  // [s] of the caller's clock at the start, or since its last jump

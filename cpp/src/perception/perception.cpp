@@ -9,9 +9,12 @@
 namespace proxcgal::detail {
 namespace {
 
-// [m] from scan to scan, at most: what is watched comes near, it does not jump. Farther off it is
-// another thing that came into the zone's view, the arm itself as a rule.
-constexpr double kNearEnough = 0.08;
+// [m/s] and [m] from scan to scan, at most: what is watched comes near, it does not jump. Farther
+// off it is another thing that came into the zone's view, the arm itself as a rule. The speed is
+// that of a hand (ISO 13855).
+constexpr double kFastest = 2.0;
+constexpr double kNoise = 0.03;
+constexpr double kLongest = 0.2;  // [s] between two scans of a zone that is watched
 
 }  // namespace
 
@@ -37,6 +40,7 @@ Perception::Perception(std::shared_ptr<const Robot> robot, const Skin& skin,
   staged_.sensor.resize(room);
   staged_.zone.resize(room);
   staged_.tolerance.resize(room);
+  staged_.sigma.resize(room);
   staged_.range.resize(room);
   staged_.keep = std::make_unique<bool[]>(room);
   for (Points* points : {&staged_.origins_W, &staged_.points_W, &raw_}) {
@@ -57,6 +61,7 @@ Perception::Perception(std::shared_ptr<const Robot> robot, const Skin& skin,
   cloud_.setZero(static_cast<Eigen::Index>(room + remembered), 3);
   origins_.resize(room + remembered);
   stamps_.resize(room + remembered);
+  sigmas_.resize(room + remembered);
 }
 
 void Perception::update(double time, double delay, const JointVector& q,
@@ -123,6 +128,7 @@ void Perception::stage(double time, const Scan& scan, double stamp, Monitor& mon
     staged_.sensor[row] = scan.sensor;
     staged_.zone[row] = sensed.zone[from];
     staged_.range[row] = sensed.range[from];
+    staged_.sigma[row] = sensed.sigma[from];
     staged_.tolerance[row] =
         std::max(config_.tolerance, config_.sigmas * sensed.sigma[from]) + mesh_error_;
     staged_.origins_W.row(staged_.count) = T_WS.translation().transpose();
@@ -176,13 +182,15 @@ void Perception::keep(Sensor& sensor, int begin, int end) {
     const int zone = staged_.zone[row];
     if (watched && zone == watched_.origin.zone && !staged_.keep[row]) {
       const Vector3 moved = staged_.points_W.row(i).transpose() - watched_.obstacle_W;
-      in_contact_ = staged_.keep[row] = moved.norm() < kNearEnough;
+      const double since = std::clamp(sensor.stamp - watched_.stamp, 0.0, kLongest);
+      in_contact_ = staged_.keep[row] = moved.norm() < kNoise + kFastest * since;
     }
     if (!staged_.keep[row] || !confirmed(sensor, ranges, zone, staged_.tolerance[row])) continue;
     const auto at = static_cast<std::size_t>(sensor.n_kept++);
     sensor.kept_W[at] = staged_.points_W.row(i).transpose();
     sensor.zone[at] = static_cast<std::uint8_t>(zone);
     sensor.tolerance[at] = staged_.tolerance[row];
+    sensor.sigma[at] = staged_.sigma[row];
     sensor.view.obstacle[static_cast<std::size_t>(zone)] =
         sensor.view.empty_to[static_cast<std::size_t>(zone)];
   }
@@ -263,6 +271,10 @@ void Perception::append() {
   cloud_.middleRows(n_seen_, n) = points_W;
   std::copy_n(memory_->origins().begin(), n, origins_.begin() + n_seen_);
   std::copy_n(memory_->stamps().begin(), n, stamps_.begin() + n_seen_);
+  const double share = 1.0 / std::max(config_.sigmas, 1.0);  // of a tolerance
+  std::transform(memory_->tolerances().begin(), memory_->tolerances().begin() + n,
+                 sigmas_.begin() + n_seen_,
+                 [&](double tolerance) { return share * (tolerance - mesh_error_); });
   n_cloud_ = n_seen_ + n;
   appended_ = memory_->version();
 }
@@ -301,6 +313,7 @@ void Perception::gather() {
     for (int i = 0; i < sensor.n_kept; ++i) {
       origins_[static_cast<std::size_t>(n_cloud_)] = {id, sensor.zone[static_cast<std::size_t>(i)]};
       stamps_[static_cast<std::size_t>(n_cloud_)] = sensor.stamp;
+      sigmas_[static_cast<std::size_t>(n_cloud_)] = sensor.sigma[static_cast<std::size_t>(i)];
       cloud_.row(n_cloud_++) = sensor.kept_W[static_cast<std::size_t>(i)].transpose();
     }
   }

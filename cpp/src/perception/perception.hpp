@@ -45,6 +45,8 @@ class Perception {
   /// Rows of the cloud that the last scans show; the others are remembered.
   Eigen::Index seen_points() const { return n_seen_; }
   double stamp(Eigen::Index row) const { return stamps_[static_cast<std::size_t>(row)]; }
+  /// [m] standard deviation of the range that a point was made from.
+  double sigma(Eigen::Index row) const { return sigmas_[static_cast<std::size_t>(row)]; }
   /// Velocity of the obstacle at a point of the cloud, as far as it can be told [m/s].
   Vector3 velocity_W(double time, const Vector3& obstacle_W) {
     return motion_ ? motion_->velocity_W(time, obstacle_W) : Vector3(Vector3::Zero());
@@ -68,10 +70,14 @@ class Perception {
   struct Watched {
     PointOrigin origin;
     Vector3 obstacle_W = Vector3::Zero();
+    double stamp = 0.0;  ///< [s] when it was measured
   };
   void watch(const Watched& watched);
-  /// Is the watched pair in the cloud only because it was watched?
-  bool in_contact() const { return in_contact_; }
+  /// Is this point of the cloud, the watched one, there only because it was watched?
+  bool in_contact(const PointOrigin& origin) const {
+    return in_contact_ && origin.sensor == watched_.origin.sensor &&
+           origin.zone == watched_.origin.zone;
+  }
   double sense_us = 0, filter_us = 0, memory_us = 0;  ///< of the last update, where timings are on
   bool timings = false;
 
@@ -85,9 +91,9 @@ class Perception {
     double stamp = -kInfinity;  // [s] of its last usable scan
     std::array<Vector3, kZones> raw_W, kept_W;
     std::array<std::uint8_t, kZones> zone;
-    std::array<double, kZones> tolerance;  // [m] of the points kept
-    bool leaves = false;                   // the points below are no longer in the cloud
-    bool doubtful = false;                 // its last scan is one of a payload that is stuck
+    std::array<double, kZones> tolerance, sigma;  // [m] of the points kept
+    bool leaves = false;                          // the points below are no longer in the cloud
+    bool doubtful = false;                        // its last scan is one of a payload that is stuck
     ScanView view;
     int n_left = 0;
     std::array<RememberedPoint, kZones> left;
@@ -125,7 +131,7 @@ class Perception {
   // Points of the scans of one stamp, side by side.
   struct Staged {
     std::vector<int> sensor, zone;
-    std::vector<double> tolerance, range;
+    std::vector<double> tolerance, sigma, range;
     Points origins_W, points_W;
     std::unique_ptr<bool[]> keep;
     Eigen::Index count = 0;
@@ -134,6 +140,7 @@ class Perception {
   mutable Points raw_;
   std::vector<PointOrigin> origins_;
   std::vector<double> stamps_;    // [s]
+  std::vector<double> sigmas_;    // [m]
   std::unique_ptr<bool[]> body_;  // of the remembered points
   Eigen::Index n_cloud_ = 0, n_seen_ = 0;
 };

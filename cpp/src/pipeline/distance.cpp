@@ -213,7 +213,6 @@ void closest_pairs(const Robot& robot, const Posture& posture, const PointsRef& 
 }
 
 SignedDistance signed_distance(const Robot& robot, const Posture& posture, const Vector3& point_W) {
-  constexpr double around = 0.5;     // of once round
   constexpr double touching = 1e-9;  // [m] nearer than this the direction to the surface is noise
   constexpr double step = 1e-6;      // [m] off the surface, to see which side is out
   SignedDistance best;
@@ -221,10 +220,7 @@ SignedDistance signed_distance(const Robot& robot, const Posture& posture, const
     const MeshTree& tree = robot.tree(link);
     const Pose& T_WL = posture.T_WL[static_cast<std::size_t>(link)];
     const Vector3 point_L = detail::into(T_WL, point_W);
-    const Bounds& box = tree.bounds();
-    const bool within =
-        (point_L.array() >= box.low.array() && point_L.array() <= box.high.array()).all();
-    const bool inside = within && std::abs(tree.winding_number(point_L)) > around;
+    const bool inside = tree.inside(point_L);
     if (!inside && best.distance <= 0.0) continue;
     const auto found = tree.nearest(point_L, inside ? kInfinity : best.distance * best.distance);
     if (!found) continue;

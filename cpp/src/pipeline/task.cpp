@@ -34,15 +34,6 @@ Vector3 saturated(const Vector3& v, double bound) {
   return length > bound ? Vector3(v * (bound / length)) : v;
 }
 
-/// n of [WA] eq. (6): unit, from obstacle to robot.
-Vector3 normal_W(const ControlPair& pair) {
-  constexpr double coincident = 1e-12;  // [m] no direction is left in the rounding
-  const Vector3 apart = pair.control_W - pair.obstacle_W;
-  const double length = apart.norm();
-  if (!(length > coincident)) return pair.fallback_normal_W;
-  return apart * ((pair.distance < 0.0 ? -1.0 : 1.0) / length);
-}
-
 /// d mu / d J of mu = sqrt(det(J J')), and mu. By singular values, because the usual
 /// mu J^+ is 0 / 0 at a singular posture: each one's slope is the product of all the others.
 Jacobian6 slope(const Jacobian6& J, double& mu) {
@@ -78,6 +69,14 @@ Eigen::Index arm_size(const Manipulability& spec, Eigen::Index n) {
 }
 
 }  // namespace
+
+Vector3 normal_W(const ControlPair& pair) {
+  constexpr double coincident = 1e-12;  // [m] no direction is left in the rounding
+  const Vector3 apart = pair.control_W - pair.obstacle_W;
+  const double length = apart.norm();
+  if (!(length > coincident)) return pair.fallback_normal_W;
+  return apart * ((pair.distance < 0.0 ? -1.0 : 1.0) / length);
+}
 
 JointVector opening_row(const Robot& robot, const Posture& posture, const ControlPair& pair) {
   Jacobian6 J;

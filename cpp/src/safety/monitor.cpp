@@ -16,12 +16,14 @@ Mode mode_of(Reason reason) {
   switch (reason) {
     case Reason::kJointStateInvalid:
     case Reason::kJointStateLost:
+    case Reason::kJointStateUnits:
       return Mode::kStop;
     case Reason::kAllSensorsSilent:
     case Reason::kArraySilent:
     case Reason::kBlindMotion:
     case Reason::kJointStateStale:
-    case Reason::kAvoidanceStuck:
+    case Reason::kNotFollowing:
+    case Reason::kHeldOff:
     case Reason::kNoControllableLink:
     case Reason::kGoalInvalid:
     case Reason::kDeadlinesMissed:
@@ -41,9 +43,17 @@ Mode mode_of(Reason reason) {
     case Reason::kNotExecuted:
     case Reason::kOutsideLimits:
     case Reason::kDeadlineMissed:
-      return Mode::kRun;  // told, and dealt with where it was found
+    case Reason::kAvoidanceStuck:
+    case Reason::kPinched:
+    case Reason::kLoopSlow:
+      return Mode::kRun;  // reported; handled where it was found
   }
   return Mode::kStop;
+}
+
+bool brakes_only(Reason reason) {
+  return reason == Reason::kJointStateStale || reason == Reason::kDeadlinesMissed ||
+         reason == Reason::kNotFollowing || mode_of(reason) == Mode::kStop;
 }
 
 const char* reason_name(Reason reason) {
@@ -96,6 +106,16 @@ const char* reason_name(Reason reason) {
       return "points_invalid";
     case Reason::kMountsUnchecked:
       return "mounts_unchecked";
+    case Reason::kPinched:
+      return "pinched";
+    case Reason::kJointStateUnits:
+      return "joint_state_units";
+    case Reason::kNotFollowing:
+      return "not_following";
+    case Reason::kLoopSlow:
+      return "loop_slow";
+    case Reason::kHeldOff:
+      return "held_off";
   }
   return "unknown";
 }
@@ -105,7 +125,8 @@ Monitor::Monitor(const MonitorConfig& config) : config_(config) { validate(confi
 void Monitor::begin() {
   count_ = 0;
   wanted_ = Mode::kRun;
-  slows_ = false;
+  slows_ = brakes_ = false;
+  if (held_off_) add({.reason = Reason::kHeldOff});
 }
 
 void Monitor::add(const Finding& finding) {
@@ -115,6 +136,7 @@ void Monitor::add(const Finding& finding) {
   const bool local =
       finding.reason == Reason::kSensorSilent || finding.reason == Reason::kSensorSuspect;
   if (calls_for >= Mode::kDegraded && !local) slows_ = true;
+  if (brakes_only(finding.reason)) brakes_ = true;
   // Past the room there is, the mode still counts the finding; only its details are lost.
   if (count_ < kMaxFindings) findings_[static_cast<std::size_t>(count_++)] = finding;
 }
@@ -129,20 +151,55 @@ void Monitor::deadline(bool late) {
   add(finding);
 }
 
-Mode Monitor::conclude() {
+void Monitor::count_holds(double time) {
+  for (const Finding& finding : findings()) {
+    if (mode_of(finding.reason) != Mode::kHold || finding.reason == Reason::kHeldOff) continue;
+    const auto end = begun_.begin() + n_begun_;
+    // One HOLD may have the same finding of several sensors.
+    if (std::any_of(begun_.begin(), end, [&](const Begun& each) {
+          return each.reason == finding.reason && each.time == time;
+        }))
+      continue;
+    if (n_begun_ == static_cast<int>(begun_.size())) {
+      std::rotate(begun_.begin(), begun_.begin() + 1, begun_.end());
+      --n_begun_;
+    }
+    begun_[static_cast<std::size_t>(n_begun_++)] = {finding.reason, time};
+    const auto count =
+        std::count_if(begun_.begin(), begun_.begin() + n_begun_, [&](const Begun& each) {
+          return each.reason == finding.reason && time - each.time < config_.held_off_within;
+        });
+    if (count >= config_.held_off_count && config_.held_off_within > 0.0) held_off_ = true;
+  }
+}
+
+Mode Monitor::conclude(double time) {
   slowed_for_ = slows_ ? config_.clean_cycles : std::max(slowed_for_ - 1, 0);
   if (mode_ == Mode::kStop) return mode_;
-  clean_ = wanted_ < mode_ ? clean_ + 1 : 0;
-  if (wanted_ > mode_ || clean_ >= config_.clean_cycles) {
+  if (wanted_ >= mode_) {
+    clean_ = 0;
+    clean_since_ = time;
+  } else {
+    ++clean_;
+  }
+  const bool clean = mode_ == Mode::kHold ? time - clean_since_ >= config_.hold_clear_after
+                                          : clean_ >= config_.clean_cycles;
+  if (wanted_ == Mode::kHold && mode_ < Mode::kHold) count_holds(time);
+  if (wanted_ > mode_ || (wanted_ < mode_ && clean)) {
     mode_ = wanted_;
     clean_ = 0;
+    clean_since_ = time;
   }
   return mode_;
 }
 
 bool Monitor::reset() {
-  if (mode_ != Mode::kStop || wanted_ == Mode::kStop) return false;
-  mode_ = Mode::kHold;  // and on to RUN by clean cycles
+  const bool stopped = mode_ == Mode::kStop;
+  if (stopped && wanted_ == Mode::kStop) return false;
+  if (!stopped && !held_off_) return false;
+  held_off_ = false;
+  n_begun_ = 0;
+  mode_ = Mode::kHold;  // and on to RUN once it is clean
   clean_ = 0;
   return true;
 }

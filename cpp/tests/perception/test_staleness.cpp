@@ -35,16 +35,18 @@ TEST(Controller, SilenceOfAllSensorsHoldsTheArmWithin200Milliseconds) {
   const auto robot = test::arm();
   Controller controller(robot, test::ring(), ControllerConfig{});
   Random random(11);
-  const JointVector q = bent();
+  JointVector q = bent();
   const Pose goal = goal_near(*robot, q);
   for (int i = 0; i < 100; ++i) {
     const auto batch = i % 7 == 0 ? scans(random, 10, static_cast<std::uint32_t>(i), 0.01 * i, 1.0)
                                   : std::vector<Scan>{};
-    controller.tick(0.01 * i, q, batch, goal);
+    q += 0.01 * controller.tick(0.01 * i, q, batch, goal).qd;
   }
   Mode mode = Mode::kRun;  // the last scan came at 0.98 s
   for (int i = 100; i <= 118; ++i) {
-    mode = controller.tick(0.01 * i, q, {}, goal).mode;
+    const TickOutput& out = controller.tick(0.01 * i, q, {}, goal);
+    q += 0.01 * out.qd;
+    mode = out.mode;
     if (i <= 111) {
       EXPECT_EQ(mode, Mode::kRun);
     }
@@ -59,13 +61,15 @@ TEST(Controller, SilenceOfOneArrayHoldsTheArmWithin200Milliseconds) {
     skin.mounts[s].name = (s < 5 ? "front/" : "back/") + std::to_string(s);
   Controller controller(robot, skin, ControllerConfig{});
   Random random(21);
-  const JointVector q = bent();
+  JointVector q = bent();
   const Pose goal = goal_near(*robot, q);
   Mode mode = Mode::kRun;
   for (int i = 0; i < 100; ++i) {
     auto batch = scans(random, 10, static_cast<std::uint32_t>(i), 0.01 * i, 1.0);
     if (i >= 60) batch.resize(5);  // the second array goes silent, its last scan came at 0.59 s
-    mode = controller.tick(0.01 * i, q, batch, goal).mode;
+    const TickOutput& out = controller.tick(0.01 * i, q, batch, goal);
+    q += 0.01 * out.qd;
+    mode = out.mode;
     if (i == 70) {
       EXPECT_EQ(mode, Mode::kRun);
     }

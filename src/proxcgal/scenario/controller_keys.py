@@ -33,6 +33,10 @@ class FilterKeys(core_table("FilterConfig")):
     """Body removal."""
 
 
+class LimitKeys(core_table("LimitConfig", omit=("distances",))):
+    """The stage after the solver."""
+
+
 class SolverKeys(core_table("SolverConfig")):
     """The task-priority solver."""
 
@@ -113,6 +117,12 @@ class ControllerKeys(Section):
     method: Annotated[str, core_choice("ControllerConfig", "method")] = core_key(
         "ControllerConfig", "method"
     )
+    limit: Literal["full", "papers"] = Field(
+        "full",
+        description="full: approach caps and retreat after the solver; papers: the joints' limits "
+        "only",
+    )
+    limit_settings: LimitKeys = Field(default_factory=LimitKeys)
     filter: FilterKeys = Field(default_factory=FilterKeys)
     solver: SolverKeys = Field(default_factory=SolverKeys)
     monitor: MonitorKeys = Field(default_factory=MonitorKeys)

@@ -80,6 +80,9 @@ class Setup:
             tasks=self.make_tasks(),
             filter=_core.FilterConfig(**settings.filter.model_dump()),
             solver=_core.SolverConfig(**settings.solver.model_dump()),
+            limit=_core.LimitConfig(
+                **settings.limit_settings.model_dump(), distances=settings.limit == "full"
+            ),
             monitor=_core.MonitorConfig(**settings.monitor.model_dump()),
             period=1.0 / self.scenario.simulation.control_hz,
             min_row_norm=settings.min_row_norm,

@@ -10,7 +10,7 @@
 
 namespace proxcgal {
 
-/// The tick: sense -> filter -> memory -> distance -> task -> solve -> command, under the monitor.
+/// The tick: sense -> filter -> memory -> distance -> task -> solve -> limit, under the monitor.
 ///
 /// Set-up throws; a tick never throws, allocates, locks, logs, or reads a clock for a decision.
 /// Not thread-safe: one controller, one thread.
@@ -57,7 +57,7 @@ class Controller {
   const Robot& robot() const;
   const Skin& skin() const;
   const ControllerConfig& config() const;
-  /// Leaves STOP, only once its cause is gone; true where it did.
+  /// Leaves STOP, only once its cause is gone, and what holds the arm off; true where it did.
   bool reset();
   /// The sensors sit where the skin says: ends the HOLD of `monitor.await_mounts`. For whoever has
   /// compared what they see of the arm itself with what they must see.

@@ -8,6 +8,7 @@
 #include "proxcgal/perception/memory.hpp"
 #include "proxcgal/perception/motion.hpp"
 #include "proxcgal/pipeline/filter.hpp"
+#include "proxcgal/pipeline/limit_config.hpp"
 #include "proxcgal/pipeline/sense.hpp"
 #include "proxcgal/pipeline/solve.hpp"
 #include "proxcgal/pipeline/task_config.hpp"
@@ -30,6 +31,7 @@ struct ControllerConfig {
   std::vector<TaskSpec> tasks = {Avoidance{}, Reach{}};
   FilterConfig filter;
   SolverConfig solver;
+  LimitConfig limit;
   MonitorConfig monitor;
   double period = 0.01;
   double min_row_norm = 0.05;
@@ -51,6 +53,7 @@ inline constexpr auto fields<ControllerConfig> = field_table(
           "Tasks, the most important first."),
     field(&ControllerConfig::filter, "filter", "How the body is told from obstacles."),
     field(&ControllerConfig::solver, "solver", "Constants of the pseudo-inverse."),
+    field(&ControllerConfig::limit, "limit", "The stage after the solver."),
     field(&ControllerConfig::monitor, "monitor", "Bounds of the monitor."),
     field(&ControllerConfig::period, "period", "s", above(0).at_most(0.5),
           "Nominal time from tick to tick."),
@@ -67,5 +70,6 @@ inline constexpr auto fields<ControllerConfig> = field_table(
           "Memory of points that left the sensors' view; none: as in the paper."),
     field(&ControllerConfig::motion, "motion",
           "Estimate of x_o of eq. (4) from the scans; none: taken as zero."));
+void check(const ControllerConfig& config, const std::string& path);
 
 }  // namespace proxcgal

@@ -2,6 +2,7 @@
 #include <array>
 #include <optional>
 
+#include "proxcgal/pipeline/limit.hpp"
 #include "proxcgal/pipeline/task.hpp"
 #include "proxcgal/types.hpp"
 
@@ -21,9 +22,12 @@ struct Timings {
   double total_us = 0;
 };
 
-/// Everything one tick tells. Reused: copy what you keep.
+/// Output of one tick. Reused: copy what you keep.
 struct TickOutput {
-  JointVector qd;  ///< [rad/s] or [m/s] admissible velocity
+  JointVector nominal_qd;  ///< [rad/s] or [m/s] what the solver asked for
+  JointVector qd;          ///< [rad/s] or [m/s] what is sent: within every limit
+  /// Rows of the limit stage that made `qd` another than `nominal_qd`.
+  std::span<const ActiveLimit> limited;
   /// Nearest of the links that joints can move away. In whole-body mode it drives the arm; its
   /// point is a row of `cloud_W` (`tick`) or of the points given (`tick_known`).
   std::optional<ClosestPair> pair;

@@ -88,13 +88,14 @@ class MeshTree {
   /// Smallest t >= t_min of a hit of origin + t direction; infinity where nothing is hit.
   double first_hit(const Vector3& origin_L, const Vector3& direction_L, double t_min = 0.0) const;
 
-  /// Is the point inside the surface? By the parity of crossings along three rays, two of which
-  /// decide: drawn meshes are open here and there.
+  /// Is the point inside the surface: does it go round the point more than half? The one test of
+  /// tick and evaluation: drawn meshes are open here and there. By the tree; where that leaves a
+  /// doubt, by every triangle.
   bool inside(const Vector3& point_L) const;
 
   /// How often the surface goes round the point: 1 or -1 inside a closed one, 0 outside, in between
   /// where it is open (Jacobson, Kavan & Sorkine-Hornung, Robust Inside-Outside Segmentation using
-  /// Generalized Winding Numbers, SIGGRAPH 2013). Asks every triangle: for set-up and evaluation.
+  /// Generalized Winding Numbers, SIGGRAPH 2013). Asks every triangle.
   double winding_number(const Vector3& point_L) const;
 
   /// Distance between two surfaces, 0 where they cross.

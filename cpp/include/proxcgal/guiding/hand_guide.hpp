@@ -2,7 +2,7 @@
 #include <memory>
 
 #include "proxcgal/guiding/admittance.hpp"
-#include "proxcgal/pipeline/command.hpp"
+#include "proxcgal/pipeline/limit.hpp"
 #include "proxcgal/pipeline/solve.hpp"
 #include "proxcgal/robot.hpp"
 
@@ -57,7 +57,8 @@ class HandGuide {
   std::shared_ptr<const Robot> robot_;
   HandGuideConfig config_;
   Admittance admittance_;
-  Limits limits_;
+  JointVector qd_max_;  // [rad/s] or [m/s]
+  Limiter limiter_;
   Posture posture_;
   Task task_;
   Solution solution_;

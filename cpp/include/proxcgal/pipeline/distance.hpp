@@ -36,8 +36,7 @@ struct SignedDistance {
 };
 
 /// Distance to the union of all links, with its sign. Inside is where a link's surface goes round
-/// the point more than half (`MeshTree::winding_number`). Asks every triangle of a link whose box
-/// holds the point: not for the tick.
+/// the point more than half (`MeshTree::inside`).
 SignedDistance signed_distance(const Robot& robot, const Posture& posture, const Vector3& point_W);
 
 }  // namespace proxcgal

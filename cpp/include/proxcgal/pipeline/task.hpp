@@ -78,6 +78,8 @@ void build_self_collision(const SelfCollision& spec, const Robot& robot, const P
                           std::span<const LinkPair> pairs, BuiltTask& out);
 /// @}
 
+/// n of [WA] eq. (6): unit, from the obstacle to the robot; turned where the distance is negative.
+Vector3 normal_W(const ControlPair& pair);
 /// n'(J_a - J_b) of two links, (n,): the rate at which they part, by the joints' velocities.
 JointVector parting_row(const Robot& robot, const Posture& posture, const LinkPair& pair);
 /// n'J_lin of a pair, (n,): the rate at which its distance opens, by the joints' velocities.

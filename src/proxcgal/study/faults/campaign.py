@@ -33,11 +33,13 @@ from proxcgal.study.trial_simulation import robot_of, simulate_trial
 #: Scenes in which the arm moves, and every sensor sees a room.
 SCENES = ("timing_ur10e", "timing_panda")
 SET = (
-    "goal.offset=[0.0, 0.25, 0.05]", "duration=1.9", "vertices_per_link=1000",
+    "goal.offset=[0.0, 0.25, 0.05]", "duration=2.1", "vertices_per_link=1000",
     "skin.check_mounts=false",
 )  # fmt: skip
 EARLIEST, LATEST = 0.3, 0.6  # [s] of the onset, drawn: the arm moves
-RECOVERY = 0.5  # [s] after the fault's end, by when the arm must be free again
+#: [s] after the fault's end, by when the arm must be free again: HOLD clears 0.5 s after the first
+#: clean scan.
+RECOVERY = 0.7
 COLUMNS = (
     "right", "latency_ms", "reached", "worst_mode", "told", "recovered", "same_commands",
     "no_flight", "qd_max",

@@ -13,7 +13,7 @@ _CONTACT = "cpp/tests/control/test_contact.cpp"
 _CLOCK = "cpp/tests/perception/test_clock.cpp"
 _REMEMBERING = "cpp/tests/perception/test_remembering.cpp"
 _MISBEHAVIOUR = "cpp/tests/control/test_misbehaviour.cpp"
-_COMMAND = "cpp/tests/pipeline/test_admissible.cpp"
+_LIMIT_ROWS = "cpp/tests/pipeline/test_limit_rows.cpp"
 _MESH = "cpp/tests/geometry/test_mesh_tree.cpp"
 _PIPELINE = "cpp/tests/pipeline/test_pipeline.cpp"
 _FUZZ = "cpp/tests/test_fuzz.cpp"
@@ -84,11 +84,19 @@ SHOWN: tuple[Shown, ...] = (
           ((_STALENESS, "ANanJointStateStopsWithinOneCycleAndStaysStopped"),)),
     Shown("joint state old", "HOLD after 20 ms, STOP after 100 ms",
           ((_STALENESS, "AnOldJointStateHoldsAndAtLastStops"),)),
-    Shown("avoidance not executed inside d_min", "told; HOLD after 0.1 s",
-          ((_MISBEHAVIOUR, "AvoidanceThatIsNotExecutedInsideTheLeastDistanceHolds"),)),
+    Shown("avoidance not executed inside d_min, or pinched between two things",
+          "reported; lower levels yield, what can be executed is; never a stop",
+          ((_MISBEHAVIOUR,
+            "AnArmBetweenTwoPointsOfOneLinkIsReportedAsPinchedAndStuckAndNeverHeld"),
+           (_LIMIT_ROWS, "BetweenTwoPlatesTheArmStandsWithoutALimitCycle"))),
+    Shown("late ticks: jitter, always 1.5 or 2 times the period", "no joint passes a limit",
+          ((_LIMIT_ROWS, "KeepsEveryJointInsideItsLimitsUnderLateTicks"),)),
+    Shown("goal that is no pose, with an obstacle near",
+          "HOLD: the nominal motion stops, retreat goes on",
+          ((_CONTACT, "AGoalThatIsNoPoseStopsTheNominalMotionAndNeverTheRetreat"),)),
     Shown("start outside joint limits", "only inward",
           ((_MISBEHAVIOUR, "OutsideItsLimitsAJointOnlyMovesInward"),
-           (_COMMAND, "LetsAJointOutsideItsLimitsMoveInwardsOnly"))),
+           (_LIMIT_ROWS, "LetsAJointOutsideItsLimitsMoveInwardsOnly"))),
     Shown("singularity", "joint speed bounded and continuous",
           ((_MISBEHAVIOUR, "ASingularPostureKeepsJointSpeedsBoundedAndContinuous"),)),
     Shown("conflicting tasks", "the safety level's residual stays best, the others' are told",
@@ -208,7 +216,7 @@ folder, with the figures of that campaign.
 Every fault is put in while the arm moves among panel, walls and cabinet, at a random moment and a
 random sensor; the `[[fault]]` tables of docs/scenarios.md do the same in any scenario.
 A run is right when the required mode comes in time and no farther one, the finding is
-told, the arm is free again half a second after the fault, and, where no command may change, the
+told, the arm is free again 0.7 s after the fault, and, where no command may change, the
 commands are those of the run without the fault, to the bit. Latency is from the fault's onset, told
 at the next tick: it may pass its bound by a tick of 10 ms. Robots meet the same draws, run by run:
 where the onset and the sensors' rate alone decide, their latencies are the same.

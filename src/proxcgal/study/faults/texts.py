@@ -26,7 +26,7 @@ def listings(summary: Summary) -> list[Listing]:
             caption="Every fault lasts 0.6 s (one missed deadline, a joint state that is not a "
             "number: a tick) and begins at a random "
             "moment, at a random sensor. Right: the required mode in time and no other, the "
-            "finding told, the arm free again 0.5 s after the fault; where no command may change, "
+            "finding told, the arm free again 0.7 s after the fault; where no command may change, "
             "the same commands as without it, to the bit. Latency from the fault's onset, told at "
             "the next tick (10 ms).",
             names=("fault", "robot", "required", "runs", "right", "median", "worst", "bound",
