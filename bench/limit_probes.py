@@ -232,8 +232,9 @@ def balls(robot: px.Robot, runs: int, told: bool = False) -> str:
         short = some[:, 2] < np.minimum(REACHABLE, some[:, 3] - 0.02)
         lines.append(
             f"  {speed:.1f} m/s: least {some[:, 1].min():.3f}, median"
-            f" {np.median(some[:, 1]):.3f} m; final least {some[:, 2].min():.3f} m, short {short.sum()} of {len(some)};"
-            f" own closing under 0.10 m at most {some[:, 4].max():.3f} m/s"
+            f" {np.median(some[:, 1]):.3f} m; final least {some[:, 2].min():.3f} m,"
+            f" short {short.sum()} of {len(some)}; own closing under 0.10 m at most"
+            f" {some[:, 4].max():.3f} m/s"
         )
     return "\n".join(lines)
 
