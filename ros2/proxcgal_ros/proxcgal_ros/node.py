@@ -62,7 +62,18 @@ class ControllerNode(Node):
                 f"parameter controller = {controller!r}: must be {' or '.join(LIVE_CONTROLLERS)}"
             )
         self._name = controller
-        setup = Setup.of(load_scenario(name, changes))
+        limit = parameters.fixed_text(
+            self, "limit", "full",
+            "full, or papers: no approach caps and no retreat after the solver, for simulations",
+        )  # fmt: skip
+        if limit not in ("full", "papers"):
+            raise ConfigError(f"parameter limit = {limit!r}: must be full or papers")
+        if limit == "papers":
+            self.get_logger().warning(
+                "limit:=papers: only the joints' limits hold; next to people or a real arm: full"
+            )
+        # Whatever the scene says: its own is for the papers' figures.
+        setup = Setup.of(load_scenario(name, [*changes, f"controller.limit={limit}"]))
         values = setup.scenario.controller.model_dump()
         numbers = parameters.declare_numbers(self, values)
         second = parameters.declare_second_goal(self)

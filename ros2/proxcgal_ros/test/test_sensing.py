@@ -263,6 +263,7 @@ def test_sensors_that_sit_elsewhere_end_the_node_before_it_commands(
         ("scenario:=3", "scenario = 3: must be a text"),
         ("reset_service:=2", "reset_service = 2: must be true or false"),
         ("controller:=best", "controller = 'best': must be wb or sm or wb_memory"),
+        ("limit:=none", "limit = 'none': must be full or papers"),
     ],
 )
 def test_a_parameter_that_cannot_be_ends_the_node_with_a_line(
@@ -274,7 +275,7 @@ def test_a_parameter_that_cannot_be_ends_the_node_with_a_line(
 
 
 def test_a_parameter_that_the_node_does_not_know_is_told(processes: Processes) -> None:
-    inputs = ("-p", "d_mim:=0.3", "-p", "second_goal:=preempt")
+    inputs = ("-p", "d_mim:=0.3", "-p", "second_goal:=preempt", "-p", "limit:=papers")
     processes.start("node", "node", "--ros-args", *inputs)
     told = "parameter d_mim: not known, it changes nothing; did you mean d_min?"
     end = time.monotonic() + PATIENCE
@@ -282,3 +283,4 @@ def test_a_parameter_that_the_node_does_not_know_is_told(processes: Processes) -
         time.sleep(0.05)
     assert told in processes.said("node")
     assert "second_goal: not known" not in processes.said("node")
+    assert "limit:=papers: only the joints' limits hold" in processes.said("node")
