@@ -172,12 +172,6 @@ struct Controller::Impl {
     return {estimate_ref_W, cloud_W, obstacle_W, config.motion->radius};
   }
 
-  /// The solution after each level of the stack.
-  std::span<const JointVector> solve_stack() {
-    solve(stack.tasks(), robot->n_q(), limits.qd_max, config.solver, solution);
-    return {solution.rho.data(), static_cast<std::size_t>(solution.levels) + 1};
-  }
-
   /// The nearest pair of each link, as far as something could limit the link's motion.
   void find_each(const PointsRef& cloud_W, const detail::ObstacleVelocities& velocities) {
     rows.begin();

@@ -52,8 +52,10 @@ Mode mode_of(Reason reason) {
 }
 
 bool brakes_only(Reason reason) {
-  return reason == Reason::kJointStateStale || reason == Reason::kDeadlinesMissed ||
-         reason == Reason::kNotFollowing || mode_of(reason) == Mode::kStop;
+  // With mounts unchecked no point is where it seems to be.
+  return reason == Reason::kMountsUnchecked || reason == Reason::kJointStateStale ||
+         reason == Reason::kDeadlinesMissed || reason == Reason::kNotFollowing ||
+         mode_of(reason) == Mode::kStop;
 }
 
 const char* reason_name(Reason reason) {
