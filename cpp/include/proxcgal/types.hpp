@@ -104,6 +104,7 @@ enum class Reason : std::uint8_t {
   kJointStateUnits,     ///< so far outside its limits that it may be in degrees
   kNotFollowing,        ///< the arm does not do what it is commanded; `link` is the joint
   kLoopSlow,            ///< ticks come later than the nominal period, on average
+  kSingular,            ///< the goal asks for motion that no joint gives from this posture
   kHeldOff,             ///< held for the same reason again and again: until `reset`
 };
 

@@ -220,6 +220,7 @@ struct Controller::Impl {
     out.timings.distance_us = watch.lap_us();
     solve(stack.tasks(), robot->n_q(), limits.qd_max, config.solver, solution);
     out.nominal_qd = solution.qd();  // [iCAT] (4.7), (4.8)
+    if (stack.is_singular(out.nominal_qd)) note(Reason::kSingular);
     rows.report_blind_motion(out.nominal_qd, monitor);
     limit();
     out.timings.solve_us = watch.lap_us();

@@ -9,6 +9,8 @@ namespace proxcgal::detail {
 namespace {
 
 constexpr double kJustBeyond = 1e-6;  // [m]
+constexpr double kAtRest = 1e-4;      // [rad/s] or [m/s] of all joints
+constexpr double kAsked = 0.01;       // [m/s] or [rad/s] that the goal asks for
 
 }  // namespace
 
@@ -90,6 +92,19 @@ void TaskStack::report(TickOutput& out) const {
     out.tasks[level] = {task_name(config_.tasks[level]), task.rate, task.activation,
                         residual(task, out.qd)};
   }
+}
+
+bool TaskStack::is_singular(const JointVector& qd) const {
+  if (!(qd.norm() < kAtRest)) return false;
+  for (std::size_t level = 0; level < config_.tasks.size(); ++level) {
+    if (!std::holds_alternative<Reach>(config_.tasks[level])) {
+      // What avoids or keeps a limit may well hold against the goal.
+      if ((tasks_[level].activation.array() > 0.0).any()) return false;
+    } else if (tasks_[level].rate.norm() > kAsked) {
+      return true;
+    }
+  }
+  return false;
 }
 
 double TaskStack::links_within(const TickOutput& out) const {

@@ -39,6 +39,8 @@ class TaskStack {
   int link(std::size_t level, Eigen::Index row) const {
     return links_[level][static_cast<std::size_t>(row)];
   }
+  /// Does the goal ask for motion that `qd` has next to nothing of, though no joint moves?
+  bool is_singular(const JointVector& qd) const;
   /// Within this distance every link has a row of its own, 0 where only the nearest has one [m].
   double links_within(const TickOutput& out) const;
   /// Within this distance having nothing to move away is a cause to hold [m].

@@ -94,7 +94,11 @@ bool Levels::least_squares(Programme& programme, const JointVector& near, double
     scratch_ = *retreat.row / scale;
     const double rate = retreat.least - retreat.row->dot(near);
     retreat.at = slacks_->add(scratch_, n_ + i, 1.0 / std::sqrt(programme.weight[k]), rate);
-    at_most_[k] = slacks_->add(scratch_, rate - programme.allowance[k] - most - leeway_ - kRelax);
+    // The slack is bounded, not the row once more: two rows that are all but parallel look like a
+    // contradiction.
+    scratch_.setZero(n_);
+    at_most_[k] = slacks_->add(scratch_, n_ + i, -1.0 / std::sqrt(programme.weight[k]),
+                               -(programme.allowance[k] + most + leeway_ + kRelax));
   }
   return finish(*slacks_, programme, near, scale, qd);
 }

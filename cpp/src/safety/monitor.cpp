@@ -46,6 +46,7 @@ Mode mode_of(Reason reason) {
     case Reason::kAvoidanceStuck:
     case Reason::kPinched:
     case Reason::kLoopSlow:
+    case Reason::kSingular:
       return Mode::kRun;  // reported; handled where it was found
   }
   return Mode::kStop;
@@ -118,6 +119,8 @@ const char* reason_name(Reason reason) {
       return "loop_slow";
     case Reason::kHeldOff:
       return "held_off";
+    case Reason::kSingular:
+      return "singular";
   }
   return "unknown";
 }

@@ -143,6 +143,32 @@ TEST(Misbehaviour, ASingularPostureKeepsJointSpeedsBoundedAndContinuous) {
   }
 }
 
+TEST(Misbehaviour, AnArmThatIsStretchedOutExactlyReportsThatItCannotMoveAlongItself) {
+  const auto robot = test::arm();
+  Controller controller(robot, Skin{}, ControllerConfig{});
+  const JointVector q = JointVector::Zero(6);
+  Pose goal = tool_at(*robot, q);
+  goal.translation().z() -= 0.3;  // straight towards its base
+  controller.tick_known(0.0, q, Points(0, 3), goal);
+  EXPECT_TRUE(found(controller, Reason::kSingular));
+  goal.translation().x() += 0.3;
+  controller.tick_known(0.01, q, Points(0, 3), goal);
+  EXPECT_FALSE(found(controller, Reason::kSingular));
+}
+
+TEST(Misbehaviour, AGoalWhoseRotationIsRoundedToFourDecimalsIsTaken) {
+  const auto robot = test::arm();
+  Controller controller(robot, Skin{}, ControllerConfig{});
+  const JointVector q = bent();
+  Pose goal = tool_at(*robot, q);
+  for (double& value : goal.linear().reshaped()) value = std::round(1e4 * value) / 1e4;
+  controller.tick_known(0.0, q, Points(0, 3), goal);
+  EXPECT_FALSE(found(controller, Reason::kGoalInvalid));
+  goal.linear() *= 1.01;
+  controller.tick_known(0.01, q, Points(0, 3), goal);
+  EXPECT_TRUE(found(controller, Reason::kGoalInvalid));
+}
+
 TEST(Misbehaviour, AgainstAConflictingGoalTheSafetyLevelKeepsItsBestAndBothTellWhatIsMissing) {
   const auto robot = test::arm();
   Random random(33);
