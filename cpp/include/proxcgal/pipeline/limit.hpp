@@ -153,8 +153,8 @@ struct LimitOutput {
 ///
 /// (0) `joint_interval`. (1) Approach caps row qd >= min(-c, row qd_brake), so that the braking
 /// command fulfils (0) and (1) whatever the rows are. (2a) The largest violation of the retreat
-/// rows is made least, where a row leaves over the first 0.04 m beyond d_stop: none enters or leaves
-/// in a step. (2b) The weighted sum of squares of all violations is made least. (3) The
+/// rows is made least, where a row leaves over the first 0.04 m beyond d_stop: none enters or
+/// leaves in a step. (2b) The weighted sum of squares of all violations is made least. (3) The
 /// command nearest to the nominal in W = sum of w_k J_k' A_k J_k + eps I; the first level of the
 /// stack has w = 1, each one below it `level_ratio` of the one above, so that lower levels yield
 /// first. (2a) and (2b) are solved only where (3) has no solution with every retreat row fulfilled.
