@@ -183,14 +183,18 @@ struct Controller::Impl {
 
   /// Every distance that limits this tick's velocity.
   void gather(const detail::DistanceScene& scene) {
+    if (config.limit.distances) {
+      rows.add_links(scene, control_points);
+      if (out.pair) {
+        rows.keep_nearest(posture, trusted.control(out, Vector3::Zero()), out.trusted_distance,
+                          limiter.state());
+      }
+      if (config.control_point == ControlPoint::kSensor && out.control.link >= 0)
+        rows.add_sensor_point(posture, out.control);
+      rows.add_own(posture, stack.own_spec(), stack.own_pairs());
+      rows.add_floor(posture);
+    }
     if (scene.perception != nullptr) rows.add_silent_views(clock.now(), posture, *scene.perception);
-    if (!config.limit.distances) return;
-    rows.add_links(scene, control_points);
-    if (out.pair) rows.keep_nearest(out.trusted_distance, limiter.state());
-    if (config.control_point == ControlPoint::kSensor && out.control.link >= 0)
-      rows.add_sensor_point(posture, out.control);
-    rows.add_own(posture, stack.own_spec(), stack.own_pairs());
-    rows.add_floor(posture);
   }
 
   /// From the solution to the velocity that is sent: the only place that changes it.

@@ -7,6 +7,7 @@ namespace proxcgal::detail {
 namespace {
 
 constexpr double kBlindMotion = 0.02;   // [m/s] slower motion into a silent view is not reported
+constexpr double kSameRow = 1e-9;       // [m] rows that differ by less are one
 constexpr double kStiffest = 10.0;      // [1/s]
 constexpr double kFarthestReach = 1.5;  // [m] of a search round a link
 
@@ -129,7 +130,8 @@ void DistanceRows::add_links(const DistanceScene& scene, ControlPoints& control_
   }
 }
 
-void DistanceRows::keep_nearest(double nearest, const LimitState& state) {
+void DistanceRows::keep_nearest(const Posture& posture, const ControlPair& pair, double nearest,
+                                const LimitState& state) {
   const Avoidance* spec = avoidance();
   if (!whole_body_ || spec == nullptr) return;
   // Inside d_min the nearest pair comes no nearer, whatever the other rows ask for, and those that
@@ -138,6 +140,19 @@ void DistanceRows::keep_nearest(double nearest, const LimitState& state) {
       std::max(0.0, nearest - spec->d_min) / (state.reaction + 0.5 * state.braking_time);
   const double stiffness =
       std::min(kStiffest, std::exp(-1.0) / config_.limit.loop_delay(config_.period));
+  // An old scan's pair may count as the nearest although its link has one that is nearer.
+  const JointVector row = opening_row(robot_, posture, pair);
+  const bool known = std::any_of(caps_.begin(), caps_.end(), [&](const ApproachCap& cap) {
+    return cap.link == pair.link && (cap.row - row).norm() < kSameRow;
+  });
+  if (!known) {
+    caps_.push_back({.row = row,
+                     .distance = nearest,
+                     .stop = config_.limit.d_stop,
+                     .near = config_.limit.near_distance,
+                     .kind = LimitKind::kApproach,
+                     .link = pair.link});
+  }
   for (ApproachCap& cap : caps_) {
     if (cap.kind != LimitKind::kApproach) continue;
     const double farther = std::max(0.0, cap.distance - nearest);

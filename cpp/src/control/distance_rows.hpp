@@ -43,8 +43,10 @@ class DistanceRows {
 
   /// Caps for the nearest pair of every link, retreat rows for those that joints can open.
   void add_links(const DistanceScene& scene, ControlPoints& control_points);
-  /// Keeps the nearest pair from coming nearer inside d_min. @param nearest  [m] its distance
-  void keep_nearest(double nearest, const LimitState& state);
+  /// Keeps the pair that drives the arm from coming nearer inside d_min.
+  /// @param nearest  [m] its trusted distance
+  void keep_nearest(const Posture& posture, const ControlPair& pair, double nearest,
+                    const LimitState& state);
   /// Retreat of the sensor's mounting point, the SM baseline's.
   void add_sensor_point(const Posture& posture, const ControlPair& control);
   /// The robot's own links.

@@ -158,7 +158,9 @@ TEST(Limit, LowerLevelsYieldFirst) {
   Limiter limiter(one.limits, {}, kDt);
   const LimitOutput& out = one.through(limiter);
   EXPECT_NEAR(out.qd.sum(), 0.09, 1e-9);
-  EXPECT_NEAR((0.09 - out.qd[1]) / (0.09 - out.qd[0]), 10.0, 0.2);
+  const LimitConfig& config = limiter.config();
+  const double weights = (1.0 + config.least_weight) / (config.level_ratio + config.least_weight);
+  EXPECT_NEAR((0.09 - out.qd[1]) / (0.09 - out.qd[0]), weights, 1e-6);
 }
 
 TEST(Limit, IsContinuousWhereARowCrossesDStop) {
