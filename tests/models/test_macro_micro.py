@@ -21,8 +21,9 @@ def joint() -> px.Robot:
 
 
 def tick(robot: px.Robot, tasks: list[object], q: np.ndarray) -> px.TickOutput:
-    """What comes of a posture once the command has settled."""
-    ctrl = px.Controller(robot, px.Skin([], px.SensorModel()), px.ControllerConfig(tasks=tasks))
+    """What comes of a posture once the command has settled: the arm is held where it is."""
+    config = px.ControllerConfig(tasks=tasks, monitor=px.MonitorConfig(following_tolerance=np.inf))
+    ctrl = px.Controller(robot, px.Skin([], px.SensorModel()), config)
     for k in range(60):
         out = ctrl.tick_known(0.01 * k, q, NOTHING, robot.tool_pose(q))
     return out
