@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import proxcgal as px
-from proxcgal.core.modes import STOP
+from proxcgal.core.modes import DEGRADED, HOLD, STOP
 from proxcgal.core.transforms import pose
 from proxcgal.models.mesh.display import display_meshes
 from proxcgal.scenario.fault_keys import Fault
@@ -111,7 +111,7 @@ def test_what_a_silent_sensor_saw_last_is_held_and_the_monitor_misses_it(front: 
     assert len(held.held_W) == counts[0]
     assert np.isin(held.held_W, whole.kept_W).all()
     assert not np.isin(held.kept_W, whole.kept_W).all()
-    assert result.mode == 1
+    assert result.mode in (DEGRADED, HOLD)  # HOLD: the goal lies where that sensor looked
     assert "sensor_silent" in held.found
 
 
